@@ -6,11 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from springcheck import checks, engines, schemes
-from springcheck.bath import THERMOSTATS
 from springcheck.cli import explain, main
 from springcheck.errors import SpringcheckError
 from springcheck.identify.meanings import MEANINGS
@@ -29,12 +27,6 @@ def test_a_scheme_says_its_step_and_source(name: str) -> None:
     scheme, said = schemes.scheme(name), list(explain.lines(name))
     assert sum(line.startswith("  ") for line in said) >= max(1, len(scheme.stages), len(scheme.b))
     assert scheme.source in " ".join(" ".join(said).split())
-
-
-def test_the_title_of_a_scheme_is_a_name_too() -> None:
-    assert len(schemes.known()) > 30
-    for scheme in schemes.known().values():
-        assert next(iter(explain.lines(scheme.title))) == f"{scheme.name}: {scheme.title}"
 
 
 @pytest.mark.parametrize("command", [["explain", "scipy-rk45"], ["judge", "a.csv", "--scheme", "scipy-rk45"]])
@@ -95,15 +87,6 @@ def test_a_term_of_scene_files_is_explained(name: str) -> None:
     assert f"{name}, a term: " in "".join(explain.lines(name))
 
 
-@pytest.mark.parametrize("name", ["zzz", "wieght", "velocity"])
-def test_what_is_listed_beside_an_unknown_name_is_whole(name: str) -> None:
-    """It was cut in the middle of its lists: "symplectic-defect, .. ussi-unsigned"."""
-    with pytest.raises(SpringcheckError) as found:
-        list(explain.lines(name))
-    assert " .. " not in str(found.value)
-    assert ("weight" in str(found.value)) is (name == "wieght")
-
-
 def test_a_shown_scene_is_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert len(scenefile.names()) > 20
     for name in scenefile.names():
@@ -153,22 +136,10 @@ def test_a_splitting_with_a_stage_of_friction_is_conformally_symplectic() -> Non
     assert "conformally" not in " ".join(explain.lines("velocity-verlet"))
 
 
-def test_a_held_force_speeds_up_along_itself() -> None:
-    # F is the force, -k q on a spring: v' = v + h F/m
-    assert "v' = v + h F/m" in " ".join(explain.lines("held-force"))
-
-
-def test_a_thermostat_is_explained_by_numbers_that_make_its_step() -> None:
-    """Each stage of OBABO has half the friction and a draw of its own, and what is printed is the step."""
-    printed = [line.strip() for line in explain.scheme_lines(schemes.scheme("obabo"))]
-    first, last = (next(x for x in printed if x.endswith(f"xi_{i}")) for i in (1, 2))
-    c = float(np.exp(-0.1 / 2))
-    assert first == f"p = {c:.6g} p + {np.sqrt(1 - c * c):.6g} sqrt(m kT) xi_1"
-    assert last == first.replace("xi_1", "xi_2")
-    assert "with the numbers of x = gamma h = 0.1" in printed
-    kinds = {name: "\n".join(explain.scheme_lines(schemes.scheme(name))) for name in THERMOSTATS}
-    assert not any("c(x)" in text for text in kinds.values())
-    assert kinds["gj-iv"] != kinds["gj-vi"].replace("VI", "IV").replace("gj-vi", "gj-iv")
+def test_a_thermostat_is_explained_by_its_stages_and_averages() -> None:
+    said = "\n".join(explain.scheme_lines(schemes.scheme("obabo")))
+    assert "exchange" in said
+    assert "k<q**2>/kT" in said
 
 
 def test_sentences_are_there_without_docstrings() -> None:

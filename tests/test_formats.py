@@ -187,17 +187,6 @@ def trr(run: Trajectory) -> list[str]:
     return ["x.trr"]
 
 
-def gro(run: Trajectory) -> list[str]:
-    out = []
-    for t, atoms in frames(run, universe()):
-        atoms.atoms.write("one.gro")
-        lines = Path("one.gro").read_text().splitlines()
-        # as trjconv writes the titles of several frames
-        out += [f"spring t= {t:9.5f} step= {round(t / SCENE.step)}", *lines[1:]]
-    Path("x.gro").write_text("\n".join(out) + "\n")
-    return ["x.gro"]
-
-
 def fixed_decimals(run: Trajectory) -> list[str]:
     """Velocities are a tenth of positions, and are written a digit coarser for it."""
     np.savetxt("x.txt", np.stack([run.t, run.q[:, 0], run.p[:, 0]], axis=1), fmt="%.8f", header="t q p")
@@ -254,44 +243,6 @@ def plain_xyz(run: Trajectory) -> list[str]:
         out += ["1", f"made by hand, t = {float(t)!r}", "Ar " + " ".join(f"{x:.17g}" for x in numbers)]
     Path("x.xyz").write_text("\n".join(out) + "\n")
     return ["x.xyz"]
-
-
-def lammps_log(run: Trajectory) -> list[str]:
-    """Two runs, the second from the frame that the first ended with."""
-    lines = ["LAMMPS (29 Aug 2024)", "thermo_style custom step v_q v_p", "Per MPI rank memory allocation 3"]
-    half = len(run.t) // 2
-    for part in (range(half + 1), range(half, len(run.t))):
-        lines.append("   Step          v_q           v_p      ")
-        lines += [f"{i:10d} {run.q[i, 0]:.17g} {run.p[i, 0]:.17g}" for i in part]
-        lines += ["Loop time of 0.0123 on 1 procs for 100 steps with 1 atoms", "", "Performance: 12 ns/day"]
-    Path("log.lammps").write_text("\n".join(lines) + "\n")
-    return ["log.lammps", "--step", repr(SCENE.step)]
-
-
-def test_every_run_of_a_log_is_read_whose_columns_suffice_and_the_others_are_said(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """The columns of the first run were those of the log: what had others was lost without a word."""
-    run = made()
-    q, p, half, end = run.q[:, 0].tolist(), run.p[:, 0].tolist(), len(run.t) // 2, len(run.t)
-    parts = {
-        "Step Temp PotEng": [f"{-i} 1.0 2.0" for i in (4, 2, 0)],
-        "Step v_q v_p": [f"{i} {q[i]!r} {p[i]!r}" for i in range(half + 1)],
-        "Step Temp v_p v_q": [f"{i} 1 {p[i]!r} {q[i]!r}" for i in range(half, end)],
-        "Step Temp": [f"{i} 1.0" for i in (end - 1, end + 1)],
-    }
-    text = "".join(f"{head}\n" + "\n".join(rows) + "\nLoop time of 1\n" for head, rows in parts.items())
-    Path("log.lammps").write_text("LAMMPS (29 Aug 2024)\n" + text)
-    found = read_one("log.lammps", step=SCENE.step)
-    assert np.array_equal(found.q, run.q)
-    assert np.array_equal(found.p, run.p)
-    assert [note.partition(" are")[0] for note in found.notes] == [
-        "steps -4 to 0",
-        f"steps {end - 1} to {end + 1}",
-    ]
-    scene = ["--scene", "spring-uneven", "--scheme", "semi-implicit-euler", "--step", repr(SCENE.step)]
-    assert main(["judge", "log.lammps", *scene]) == 0
-    assert "left out: their columns are Step, Temp" in capsys.readouterr().out
 
 
 def json_of_lists(run: Trajectory) -> list[str]:
@@ -360,32 +311,7 @@ def matlab_struct(run: Trajectory) -> list[str]:
     return ["x.mat"]
 
 
-def octave_matrix(name: str, rows: np.ndarray) -> str:
-    head = f"# name: {name}\n# type: matrix\n# rows: {rows.shape[0]}\n# columns: {rows.shape[1]}\n"
-    return head + "".join(" " + " ".join(f"{x:.17g}" for x in row) + "\n" for row in rows) + "\n\n"
-
-
 OCTAVE = "# Created by Octave 7.3.0, Mon Nov 23 07:10:55 2026 UTC <root@vm>\n"
-
-
-def octave_text(run: Trajectory) -> list[str]:
-    """As ``save x.txt`` writes a range, a struct with a row and a column, a string and an empty matrix."""
-    known = {name: np.array(values) for name, values in rows_of(run).items()}
-    Path("x.txt").write_text(
-        f"{OCTAVE}# name: t\n# type: double_range\n# base, limit, increment\n"
-        f"0 {known['t'][-1]:.17g} {known['t'][1]:.17g}\n\n\n"
-        "# name: note\n# type: string\n# elements: 1\n# length: 5\na run\n\n\n"
-        "# name: out\n# type: scalar struct\n# ndims: 2\n 1 1\n# length: 2\n"
-        f"{octave_matrix('q', known['q'][:, None])}{octave_matrix('p', known['p'][None])}\n\n"
-        "# name: none\n# type: matrix\n# rows: 0\n# columns: 0\n\n\n"
-    )
-    return ["x.txt"]
-
-
-def octave_table(run: Trajectory) -> list[str]:
-    table = octave_matrix("data", np.array([*rows_of(run).values()]).T)
-    Path("x.txt.gz").write_bytes(gzip.compress((OCTAVE + table).encode()))
-    return ["x.txt.gz", "--columns", "t,q,p"]
 
 
 def matlab_7_3(run: Trajectory) -> list[str]:
@@ -441,10 +367,10 @@ Writer = Callable[[Trajectory], list[str]]
 WRITERS: list[Writer] = [
     csv, with_index, printed_with_index, decimal_commas, blanks,
     slashes, grace, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
-    extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
-    gzipped, fortran, plain_xyz, lammps_log, json_of_lists, json_of_rows,
+    extended_xyz, trr, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
+    gzipped, fortran, plain_xyz, json_of_lists, json_of_rows,
     json_of_bare_rows, json_of_pandas, excel, parquet, feather, matlab, matlab_7_3, octave, amber,
-    json_lines, json_lines_of_bare_rows, matlab_struct, octave_text, octave_table,
+    json_lines, json_lines_of_bare_rows, matlab_struct,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [
     csv, blanks, npz, in_space, dump, trr, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
@@ -475,8 +401,7 @@ def test_a_file_passes_as_its_scheme_and_fails_as_another(
     for other in ("velocity-verlet", "explicit-euler"):
         status, found = judged(capsys, arguments, other)
         assert status == 1
-        # three decimals leave each single step possible, and not all of them together
-        assert not found["identified" if write is gro else "step-defect"]
+        assert not found["step-defect"]
 
 
 @pytest.mark.parametrize(
@@ -531,9 +456,8 @@ def test_coarse_digits_are_those_of_the_quantity_that_is_written_coarsest() -> N
     assert roundoff(rows, [0]) == 2.0**-53
 
 
-def test_numbers_as_fortran_octave_and_matlab_write_them() -> None:
-    """gfortran leaves the letter out of exponents of three digits; Octave goes through int32 and arrays of
-    three dimensions by columns, writes single precision as such, and as many digits as it is told to."""
+def test_numbers_as_fortran_and_matlab_write_them() -> None:
+    """gfortran leaves the letter out of exponents of three digits."""
     assert [number(x) for x in ("1.5-100", "-2.5+100", "1.5D-02", ".5-300")] == [
         1.5e-100,
         -2.5e100,
@@ -544,15 +468,6 @@ def test_numbers_as_fortran_octave_and_matlab_write_them() -> None:
         with pytest.raises(ValueError, match="could not convert"):
             number(cell)
     assert roundoff([["1.25-100"], ["2.5-100"]], [0]) == pytest.approx(5e-3)
-    q = "# name: q\n# type: {}matrix\n# ndims: 2\n 3 2\n" + "".join(f" {x}\n" for x in range(6)) + "\n"
-    v = "# name: v\n# type: matrix\n# rows: 3\n# columns: 2\n 0.12 3\n 1 4\n 2 5\n\n"
-    t = "# name: t\n# type: range\n# base, limit, increment\n0 2 1\n\n"
-    for kind in ("int32 ", "float "):
-        Path("x.txt").write_text(OCTAVE + q.format(kind) + v + t)
-        assert read_one("x.txt").q.tolist() == [[0, 3], [1, 4], [2, 5]]
-    assert read_one(octave_text(made())[0]).roundoff == 2.0**-53
-    Path("x.txt").write_text(OCTAVE + v + v.replace("# name: v", "# name: q") + t)
-    assert read_one("x.txt").roundoff == 0.05
     scipy.io.savemat("x.mat", {"a": {"t": [0, 1.0], "q": [1, 2.0]}, "b": {"t": [0, 2.0], "q": [3, 5.0]}})
     with pytest.raises(StoreError, match=r"no array of times among a\.t, a\.q, b\.t, b\.q; name them"):
         read_one("x.mat")
@@ -628,11 +543,6 @@ BAD = [
     ("ITEM: TIMESTEP\n0\n", "damaged or cut off"),
     ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "give its time step"),
     ("PK\x03\x04zip", "NumPy cannot read it"),
-    ("# name: t\n# type: matrix\n# rows: 2\n# columns: 1\n 1\n", "line 5: t: numbers: 1, and 2 are said"),
-    ("# name: t\n# type: matrix\n# rows: x\n", "'# rows: x' says no size"),
-    ("# name: t\n# type: range\n# base, limit, increment\n0 1 0\n", "t: range holds what is no number"),
-    ("# name: t\n# type: range\n# base, limit, increment\n0 1e9 1e-9\n", "more than 16,777,216 numbers"),
-    ("# name: x\n# type: scalar\n1\n", "no array of times among x; name them, as --columns"),
     ('{"t": 1}\n{"t": ', "msgspec cannot read it"),
 ]
 
@@ -672,7 +582,6 @@ def test_a_library_reads_in_a_process_of_its_own(
 
 
 HARMFUL = {
-    "x.gro": "x\n-3\n" * 9,
     "brackets.csv": "[" * 100_000 + ",t,q,p\n0,1,2\n",
     "digits.csv": "q" + "1" * 100_000 + ",t,q,p\n0,1,2\n",
     "dots.csv": "q" + "._" * 100_000 + "x,t,q,p\n0,1,2,3\n",

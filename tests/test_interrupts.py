@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +24,8 @@ import interrupts as interrupting
 import springcheck
 from springcheck import checks, cli, driver, engines, interrupts, store
 from springcheck.engines.own import simulation
-from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.studies import workers
+from springcheck.studies.precision import bare
 from springcheck.studies.run import measure as session
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
@@ -110,7 +108,7 @@ def test_an_engine_is_asked_for_few_steps_at_a_time(monkeypatch: pytest.MonkeyPa
     assert max(calls) <= driver.PIECE
     calls.clear()
     label = engines.parse("own:euler")
-    driver.bare(scene, label)
+    bare.measure(scene, label)
     assert sum(calls) == 10**9
     assert calls[0] <= driver.PIECE
 
@@ -336,40 +334,6 @@ def test_a_native_crash_ends_the_program_with_its_signal_and_what_was_finished_i
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stdout) == (-signal.SIGSEGV, "")
     assert [run.label for run in store.summary(tmp_path / "s.h5").runs] == ["own:euler"]
-
-
-def doubled(number: int) -> int:
-    return 2 * number
-
-
-def failing() -> int:
-    raise SpringcheckError("a part went wrong")
-
-
-def test_workers_carry_out_every_part_once() -> None:
-    parts = [partial(doubled, i) for i in range(9)]
-    assert sorted(workers.carried_out(parts, 1)) == sorted(workers.carried_out(parts, 2))
-    with pytest.raises(SpringcheckError, match="a part went wrong"):
-        list(workers.carried_out([failing, *parts], 2))
-
-
-@posix
-def test_a_worker_that_dies_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(SpringcheckError, match="exit status 7"):
-        list(workers.carried_out([partial(os._exit, 7), partial(doubled, 1)], 2))
-    # before it reads: then the system resets the connection instead of closing it
-    monkeypatch.setattr(workers, "_work", os._exit)
-    with pytest.raises(SpringcheckError, match="a worker process has ended by itself"):
-        list(workers.carried_out([partial(len, "x" * 10**7)] * 2, 2))
-
-
-@posix
-def test_workers_end_when_they_are_left() -> None:
-    found = workers.carried_out([partial(time.sleep, 600), partial(doubled, 1), partial(doubled, 2)], 2)
-    next(found)
-    began = time.process_time()
-    found.close()
-    assert time.process_time() - began < 60
 
 
 def test_ctrl_c_of_a_caller_in_python_is_one_line(

@@ -17,7 +17,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Outcome
 from springcheck.studies import keeper
-from springcheck.studies.run import measure
+from springcheck.studies.run import judging
 from springcheck.studies.run.result import Report
 
 Change = Callable[[int, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -56,14 +56,14 @@ def judged(tmp_path: Path, scene: Scene, change: Change) -> Report:
         with journal.draft(run.label, scene) as draft:
             draft.append(run.t, run.q, run.p, None)
             draft.finish(keeper.attributes(run))
-        return measure.judge(scene, path, journal.sources(), [])
+        return judging.judge(scene, path, journal.finished(), [])
 
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pieces so small that 400 steps of 64 particles are long."""
-    monkeypatch.setattr(measure, "PIECE_NUMBERS", 64 * 16)
-    monkeypatch.setattr(measure, "LONG_PIECE", 64 * 4)
+    monkeypatch.setattr(judging, "PIECE_NUMBERS", 64 * 16)
+    monkeypatch.setattr(judging, "LONG_PIECE", 64 * 4)
 
 
 @pytest.mark.usefixtures("small")
@@ -92,7 +92,7 @@ def test_a_closed_form_tells_what_happened_between_the_pieces_of_springs(tmp_pat
 def test_pieces_alone_pass_nothing_where_no_closed_form_joins_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(measure, "MOST_NUMBERS", 64 * 100)
+    monkeypatch.setattr(judging, "MOST_NUMBERS", 64 * 100)
     report = judged(tmp_path, wells(400), FAULTS["right"])
     assert report.judged_frames < 100
     assert report.status == 2
@@ -114,9 +114,9 @@ def test_a_run_that_ends_early_takes_nothing_from_the_errors_of_others(tmp_path:
     with keeper.open_new(tmp_path / "a.h5", "test") as journal:
         for run in runs.values():
             journal.save(run, scene)
-        sources = journal.sources()
-        both = measure.judge(scene, tmp_path / "a.h5", sources, [])
-        alone = [measure.judge(scene, tmp_path / "a.h5", {name: sources[name]}, []) for name in runs]
+        sources = journal.finished()
+        both = judging.judge(scene, tmp_path / "a.h5", sources, [])
+        alone = [judging.judge(scene, tmp_path / "a.h5", {name: sources[name]}, []) for name in runs]
     assert [run.max_error for run in both.runs] == [one.runs[0].max_error for one in alone]
     assert both.comparison.labels == ("exact", *runs)
     differences = both.comparison.max_difference

@@ -149,7 +149,7 @@ def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
     path = tmp_path / "a.h5"
     asked = ["run", "spring-uneven", "-o", str(path), "--method", "own:*euler"]
     assert main(asked) == 0
-    assert "would be seen in own:" in capsys.readouterr().out
+    assert "Smallest detectable stiffness error: " in capsys.readouterr().out
     found = [v for v in store.verdicts(path) if v.check == "step-defect"]
     assert all(v.sees.stiffness is not None and v.sees.stiffness < 1e-13 for v in found)
     assert main(["inspect", str(path), "--verdicts"]) == 0

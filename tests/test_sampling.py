@@ -66,7 +66,7 @@ def test_frames_are_used_when_variances_have_settled_not_means_alone(monkeypatch
     run = measure.driver.run
     monkeypatch.setattr(measure.driver, "run", lambda x, *y, **z: (steps.append(x.steps), run(x, *y, **z))[1])
     measure.measured(engines.parse("own:andersen-after-kick"))
-    law = measure.law_at("andersen-after-kick", 1.4, measure.RATE)
+    law = measure.law_at("andersen-after-kick", np.array([1.4]), measure.RATE)
     assert float(law.growth[0]) ** (steps[1] - 500) < np.exp(-4.9)
 
 

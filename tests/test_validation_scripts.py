@@ -28,7 +28,7 @@ def _signals_stay_with_pytest(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_script_is_ended_by_the_one_function_and_looks_at_its_command_line() -> None:
-    assert len(SCRIPTS) > 50
+    assert len(SCRIPTS) > 20
     for path in SCRIPTS:
         if path.name not in STARTED_BY_OTHERS:
             text = path.read_text(encoding="utf-8")

@@ -6,9 +6,15 @@ no random file of one oscillator, every step stored, gets the name of another th
 
 Command: python validation/baths.py alarms|engines|names [COUNT [FIRST]]
 
-A case is its number; none is left out and none is tried again.  Printed by 1,500, 600 and 300 cases:
+A case is its number; none is left out and none is tried again.  Printed by 1,500, 600 and 210 cases:
 
-PRINTED
+    alarms: 1500 cases             engines: 600 cases             names: 210 cases
+             0 alarms                       0 alarms                     210 files
+          1500 runs                       600 runs                       126 listed
+         15321 verdicts                    88 runs of ase                 66 named
+                                          380 runs of lammps              18 noise of no scheme that is known
+                                          132 runs of openmm
+                                         6577 verdicts
 """
 
 from __future__ import annotations

@@ -53,8 +53,8 @@ def announce(message: str) -> None:
 
 def leave() -> None:
     """End an interrupted process now, with one line and none from the interpreter's shutdown."""
-    said = f"springcheck: {_state['message']}\n".encode(errors="replace")
-    for end in [*_ends, lambda: os.write(int(_state["errors"]), said)]:
+    said, _state["message"] = f"springcheck: {_state['message']}\n" * bool(_state["message"]), ""
+    for end in [*_ends, lambda: os.write(int(_state["errors"]), said.encode(errors="replace"))]:
         with suppress(Exception):
             end()
     os._exit(STATUS)

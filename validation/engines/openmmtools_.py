@@ -1,6 +1,6 @@
 """openmmtools' splittings by name: its LangevinIntegrator, whose letters V, R and O are B, A and O here.
 
-`springcheck census --thermostats --engine validation/engines/openmmtools_.py --method 'openmmtools:*'`
+python validation/engines/table.py --thermostats --method 'openmmtools:*' --engine .../openmmtools_.py
 """
 
 from __future__ import annotations

@@ -103,9 +103,10 @@ def _mistake(error: SpringcheckError | OSError) -> int:
     # the library names its files; any other OSError is of our own output, on a full disk for example
     closed = getattr(error, "errno", None) == errno.EBADF
     why = "standard output is closed" if closed else getattr(error, "strerror", "")
-    said = f"cannot write the output: {why}" if isinstance(error, OSError) else error
+    refused = slips.refused(error) if isinstance(error, OSError) else ""
+    said = refused or (f"cannot write the output: {why}" if isinstance(error, OSError) else error)
     print(f"springcheck: {said}", file=sys.stderr)
-    if isinstance(error, OSError):
+    if isinstance(error, OSError) and not refused:
         # nothing more can be written, not even by the interpreter's shutdown
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 2

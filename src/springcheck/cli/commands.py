@@ -277,7 +277,7 @@ KINDS = ("scenes", "methods", "checks", "terms", "schemes")
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
 _NAMES = argument("--columns", metavar="NAMES", help="a table's columns, as t,q,v; of HDF5 as t=a,q=b,v=c")
-_STEPS = argument("--step", type=float, metavar="H", help="the time step of a file that counts steps")
+_STEPS = argument("--step", "--dt", type=float, metavar="H", help="the time step of a file that counts steps")
 
 COMMANDS = (
     Command("inspect", "what is in a store", _inspect, (
@@ -325,7 +325,7 @@ COMMANDS = (
         argument("--mass", type=float, metavar="M",
                  help="mass of every particle in the file's unit (default: the file's)"),
         _NAMES,
-        argument("--step", type=float, metavar="H", help="is this the time step?"),
+        argument("--step", "--dt", type=float, metavar="H", help="is this the time step?"),
         argument("--scheme", metavar="NAME", help="is this the scheme?"),
         argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),

@@ -13,7 +13,6 @@ import numpy as np
 
 from springcheck import checks, engines, schemes
 from springcheck.bath import THERMOSTATS, Law
-from springcheck.bath.catalogue import Act
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
@@ -69,9 +68,8 @@ def _bare(name: str) -> str:
 
 def lines(name: str) -> Iterator[str]:
     """All explanations of a name.  SpringcheckError where it is unknown."""
-    known = schemes.known()
     # a scheme is found by its title too, which tables print
-    for scheme in known.values():
+    for scheme in schemes.known().values():
         if name in (scheme.name, scheme.title):
             return scheme_lines(scheme)
     if ":" in name:
@@ -79,33 +77,26 @@ def lines(name: str) -> Iterator[str]:
     # heavier to import, and rarely needed
     from springcheck.identify.meanings import MEANINGS
 
-    of_terms = terms.known()
-    parts = [_fault(fault) for fault in FAULTS if fault.name == name]
     # tables head their columns by the short names of checks
-    asked = [check for check in _CHECKS.values() if name in (check.name, check.short)]
-    parts[:0] = [check_lines(check) for check in asked]
+    parts = [check_lines(check) for check in _CHECKS.values() if name in (check.name, check.short)]
+    parts += [_fault(fault) for fault in FAULTS if fault.name == name]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
-    parts += [_term(of_terms[name])] if name in of_terms else []
+    if term := terms.known().get(name):
+        parts.append(_term(term))
     if said := word(name):
         parts.append(iter([f"{said[0]}: {said[1]}"]))
+    if not parts:
+        methods = [f"{x}:{method}" for x in engines.names() for method in engines.engine(x).methods]
+        # engines that are not asked for have schemes of their own
+        meant = [name] if name in schemes.known() else schemes.textbook(name)
+        parts = [scheme_lines(schemes.scheme(one)) for one in meant]
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))
-    methods = [
-        f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
-    ]
-    # engines that are not asked for have schemes of their own
-    if name in schemes.known():
-        return scheme_lines(schemes.scheme(name))
-    if meant := schemes.textbook(name):
-        return chain(*(chain(scheme_lines(schemes.scheme(one)), [""]) for one in meant))
-    others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *of_terms, *WORDS)
-    near = schemes.meant(name, others)
-    every = (
-        "; `springcheck list` shows the methods, checks, terms and schemes. Words that are explained: "
-        f"{', '.join(WORDS)}"
-    )
+    others = (*_CHECKS, *methods, *(x.name for x in FAULTS), *MEANINGS, *terms.known(), *WORDS)
+    every = f"; `springcheck list` shows the names, and these words are explained: {', '.join(WORDS)}"
     raise SpringcheckError(
-        f"{name!r} is not the name of a check, scheme, method, fault, finding, term or word{near or every}"
+        f"{name!r} is not the name of a check, scheme, method, fault, finding, term or word"
+        f"{schemes.meant(name, others) or every}"
     )
 
 
@@ -185,48 +176,18 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
         yield _line(f"Source: {scheme.source}")
 
 
-_ACTS = {
-    "kick": "p = p + {c}h F", "slow": "p = p + {c}h F of slow terms",
-    "fast": "p = p + {c}h F of fast terms", "held": "p = p + {c}h F, as it was last evaluated",
-    "drift": "q = q + {c}h p/m",
-    "exchange": "p = {c}p + {rest:.6g} sqrt(m kT) {xi}", "damp": "p = (1 - {c}) p",
-    "undamp": "p = p / (1 + {c})", "noise": "p = p + {c}sqrt(2 x m kT) {xi}",
-    "jump": "q = q + {c}h sqrt(2 x kT/m) {xi}", "creep": "q = q + {c}h**2 F/m", "rebuild": "p = m (q' - q)/h",
-    "rescale": "p = alpha p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
-               "b = (1 - c) kT / sum p**2/m; alpha has the sign of xi_1 + sqrt(c/b)",
-    "scale": "p = |alpha| p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
-             "b = (1 - c) kT / sum p**2/m",
-    "chain": "p = p exp(-{c}h s0/Q0) and the like, s0' = 2K - N kT - s0 s1/Q1, s1' = s0**2/Q0 - kT ...",
-    "collide": "with the chance 1 - exp(-x): p = sqrt(m kT) xi",
-}  # fmt: skip
-
 SHOWN = 0.5, 0.1
-"""h omega, and x = gamma h, at which numbers of a thermostat are shown."""
-
-
-def _act(act: Act, draws: int) -> str:
-    """A stage of a thermostat, with a coefficient that depends on x as a number."""
-    c = float(act.part(np.float64(SHOWN[1]))) if callable(act.part) else float(act.part)
-    if act.kind == "kick" and c == 0:
-        return "F is evaluated at q"
-    share = f"{c:.6g}" if callable(act.part) else str(act.part)
-    rest = math.sqrt(max(1 - c * c, 0.0)) if act.kind == "exchange" else 0.0
-    xi = f"xi_{act.draw + 1}" if draws > 1 else "xi"
-    whole = act.kind in ("damp", "undamp")
-    return _ACTS[act.kind].format(c=share if whole else "" if c == 1 else f"{share} ", rest=rest, xi=xi)
+"""h omega and gamma h at which the averages of a thermostat are shown."""
 
 
 def _thermostat(name: str) -> Iterator[str]:
-    """Stages of a random scheme, and numbers of its law on a spring."""
+    """Stages of a random scheme, and its averages on a spring."""
     scheme = THERMOSTATS[name]
-    for act in scheme.acts:
-        yield f"  {_act(act, scheme.draws)}"
-    if any(callable(act.part) for act in scheme.acts):
-        yield f"  with the numbers of x = gamma h = {SHOWN[1]}"
-    if scheme.carried:
-        yield "  the first draw xi_1 of a step is the last of the step before"
+    fixed = [act.kind if callable(act.part) or act.part == 1 else f"{act.kind} {act.part}"
+             for act in scheme.acts]  # fmt: skip
+    yield f"  Stages: {', '.join(fixed)}"
     if scheme.rescales:
-        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
+        yield "Not linear: each kinetic energy is judged by its noncentral chi-squared distribution"
         return
     turn, x = SHOWN
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)
@@ -235,7 +196,7 @@ def _thermostat(name: str) -> Iterator[str]:
         f"{of.kinetic[0]:.6f}; of a free particle D m gamma/kT {of.diffusion[0]:.6f}"
     )
     if not scheme.synchronised:
-        yield "Its velocities are of another time than its positions"
+        yield "Its velocities belong to another time than its positions"
 
 
 def _tableau(a: Sequence[Sequence[Fraction]], b: Sequence[Fraction]) -> Iterator[str]:

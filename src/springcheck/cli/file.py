@@ -231,7 +231,7 @@ def as_trajectory(
     of = _placed(path, states, scene, notes)
     scene, q, p = of.scene, of.q, of.p
     t, every = _times(path, states, scene, notes, taken)
-    _begins(path, states, of, scheme, every, notes, taken)
+    _begins(path, states, of, notes, taken)
     _digits(states, notes)
     steps = (len(q) - 1) * every
     if every != scene.every:
@@ -366,9 +366,7 @@ def _times(
     return t, every
 
 
-def _begins(
-    path: Path, states: States, of: _Placed, scheme: str, every: int, notes: list[str], taken: dict[str, str]
-) -> None:
+def _begins(path: Path, states: States, of: _Placed, notes: list[str], taken: dict[str, str]) -> None:
     """Note a first frame that differs from the scene's start; StoreError where it is another one."""
     scene, q, p = of.scene, of.q, of.p
     size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
@@ -378,7 +376,7 @@ def _begins(
     if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
         raise StoreError(
             f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
-            + start.differs(scene, scheme, states, q, p, every)
+            + start.differs(scene, states, q[0], p[0])
         )
     if size > 0 or of.moved:
         taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"

@@ -41,9 +41,11 @@ GROUPS: Mapping[str, Sequence[str]] = {
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),
     "known of the motion": ("--mass", "--stiffness", "--differences", "--arithmetic"),
-    "how much is measured": ("--thorough", "--partial", "--budget", "--quick", "--workers", "--cluster"),
+    "how much is measured": (
+        "--thorough", "--partial", "--budget", "--metric", "--long", "--quick", "--workers", "--cluster",
+    ),
     "figures": ("--particle",),
-    "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
+    "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--left-out", "--rows"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
 }  # fmt: skip
 """Headings in the order of the help, with the arguments below each."""

@@ -41,6 +41,8 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
             return out
     if not summary.complete:
         out.append(plain("unfinished: the command that writes it has not ended", "bold red"))
+    results = list(held(summary))
+    out += [line for study, found in results if study.trajectories for line in study.lines(found, options)]
     if summary.runs:
         known = summary.runs[0].parameters
         out += [
@@ -57,9 +59,9 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
             _runs(summary),
         ]
     out += [plain(f"table {name}") for name in summary.tables]
-    for study, result in held(summary):
-        said = study.lines(result, options, summary.path)
-        out += [*([] if study.trajectories else [plain()]), *said]
+    for study, result in results:
+        if not study.trajectories:
+            out += [plain(), *study.lines(result, options, summary.path)]
     return out
 
 

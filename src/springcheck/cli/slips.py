@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import re
 import sys
@@ -107,6 +108,8 @@ def _has_room() -> None:
 
 def _is_file(name: str) -> None:
     path = Path(name)
+    if not path.exists() and (store := path.with_name(f"{path.name}.h5")).is_file():
+        raise SpringcheckError(f"{name}: no such file, did you mean {store}?")
     if path.is_dir():
         raise SpringcheckError(f"{name}: it is a folder, a file is needed")
     if path.exists() and not path.is_file():
@@ -133,8 +136,26 @@ def open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def refused(error: BaseException) -> str:
+    """A limit of the system that some error comes from, in a line; "" where it comes from none."""
+    limits = {
+        errno.EMFILE: "open files (ulimit -n)",
+        errno.ENFILE: "open files on this machine",
+        errno.EAGAIN: "processes or threads (ulimit -u)",
+        errno.ENOMEM: "memory",
+    }
+    chain: BaseException | None = error
+    while chain is not None:
+        what = "memory" if isinstance(chain, MemoryError) else limits.get(getattr(chain, "errno", None) or 0)
+        if what:
+            return f"the system refuses more {what}"
+        chain = chain.__cause__ or chain.__context__
+    return ""
+
+
 def one_line(error: BaseException) -> str:
-    """One line on an error in springcheck itself, beyond a user's remedy: its type, and how to locate it."""
+    """One line on an error beyond a user's remedy: a limit of the system, or a mistake in springcheck."""
     said = " ".join(str(error).split())[:200]
     where = "SPRINGCHECK_TRACEBACK=1 shows where"
-    return f"{type(error).__name__}: {said}; this is a mistake in springcheck: {where}"
+    mistake = f"{type(error).__name__}: {said}; this is a mistake in springcheck: {where}"
+    return refused(error) or mistake

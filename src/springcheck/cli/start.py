@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import suppress
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from springcheck import schemes
-from springcheck.errors import SpringcheckError, StoreError
+from springcheck.errors import StoreError
 from springcheck.formats import States
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.text.wording import count
 
 CLOSE_STATE = 1e-6
 """Distance, relative to the amplitude, within which a state explains a first frame."""
-ROUNDINGS = 4
-"""Roundings in the difference of a frame from a step: two of each number of both."""
-MOST_STEPS, MOST_PARTICLES = 100, 1000
-"""Steps of the scheme that are tried, and the most particles of a scene for it."""
 
 
 def contradicted(path: Path, states: States, scene: Scene) -> None:
@@ -64,131 +55,33 @@ def clock(states: States, scene: Scene) -> list[str]:
     ]
 
 
-def differs(scene: Scene, scheme: str, states: States, q: Floats, p: Floats, every: int) -> str:
-    """Explain a first frame of q, p (f, n), made from the states of a file, that is not the scene's start,
-    with a remedy."""
-    at, velocities = (q[0], p[0]), states.p is None
+def differs(scene: Scene, states: States, q: Floats, p: Floats) -> str:
+    """Why the first frame q, p (n,) of a file is not the scene's start, with a remedy, as far as known."""
+    rates = "velocities" if states.p is None else "momenta"
+    kick = scene.step / 2 * np.asarray(scene.system.force(q, p), np.float64)
+    of_q, of_p = _factor(q, scene.q), _factor(p, scene.p)
+    leapfrog = "the scene's, as in a leapfrog; `springcheck identify` reads all frames"
     with np.errstate(all="ignore"):
-        found = _single(scene, *at)
-        if not (found or _is_at(scene, *at, scene.q, scene.p)):
-            found = _weighted(scene, *at, velocities) or _kicked(scene, scheme, q, p, every, states.roundoff)
-            found = found or _later(scene, scheme, *at) or _scaled(scene, *at, velocities)
-        return found or _largest(scene, *at)
+        guesses = (
+            # nearly right: no mass and no unit explains the rest
+            (q, p, ""),
+            (q, p * scene.m, "its momenta are the scene's velocities; name their columns v, as t,q,v"),
+            (q, p / scene.m, f"its {rates} are the scene's times the masses; name momenta p, as t,q,p"),
+            (q, p + kick, f"its {rates} are half a kick before {leapfrog}"),
+            (q, p - kick, f"its {rates} are half a kick after {leapfrog}"),
+            (q / of_q, p / of_p, f"positions are {of_q:g} times the scene's, and {rates} {of_p:g} times: "
+                                 "other units?"),
+        )  # fmt: skip
+        close = [why for x, y, why in guesses if scene.system.norm(x - scene.q, y - scene.p) <= CLOSE_STATE]
+    if close and close[0]:
+        return close[0]
+    i = int(np.argmax(np.maximum(np.abs(q - scene.q), np.abs(p - scene.p))))
+    name, x, own = ("q", q, scene.q) if abs(q - scene.q)[i] >= abs(p - scene.p)[i] else ("p", p, scene.p)
+    return f"{name}[{i}] is {x[i]:.15g} there, and {own[i]:.15g} in the scene; give a scene that starts so"
 
 
-def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -> bool:
-    return bool(scene.system.norm(q - there_q, p - there_p) <= CLOSE_STATE)
-
-
-def _single(scene: Scene, q: Floats, p: Floats) -> str:
-    for state in ((scene.q, scene.p), (scene.q, np.float64(np.float32(scene.p / scene.m)) * scene.m)):
-        single_q, single_p = (np.float32(x) for x in state)
-        if np.array_equal(single_q, q) and np.allclose(single_p, p, rtol=1e-15, atol=0):
-            return "it is the start in single precision; store the numbers as float32, or to nine digits"
-    return ""
-
-
-def _weighted(scene: Scene, q: Floats, p: Floats, velocities: bool) -> str:
-    if _is_at(scene, q, p * scene.m, scene.q, scene.p):
-        return "its momenta are the scene's divided by the masses: velocities; name their columns v, as t,q,v"
-    if not _is_at(scene, q, p / scene.m, scene.q, scene.p):
-        return ""
-    if velocities:
-        return "its velocities are the scene's momenta; name their columns p, as t,q,p"
-    return "its momenta are the scene's times the masses; divide them by these"
-
-
-def _scaled(scene: Scene, q: Floats, p: Floats, velocities: bool) -> str:
-    of_q, of_p = _ratio(q, scene.q), _ratio(p, scene.p)
-    one = of_q if np.any(scene.q) else of_p
-    what = "velocities" if velocities else "momenta"
-    if _is_at(scene, q / one, p / one, scene.q, scene.p):
-        return (
-            f"positions and {what} are {one:.6g} times the scene's, as in another unit of length; divide "
-            "both by that"
-        )
-    # for one particle any two numbers are multiples of the scene's: powers of ten are units
-    if _is_at(scene, q / _ten(of_q), p / _ten(of_p), scene.q, scene.p):
-        return (
-            f"positions are {_ten(of_q):g} times the scene's, and {what} {_ten(of_p):g} times, as in other "
-            "units; divide by these"
-        )
-    return ""
-
-
-def _ratio(x: Floats, own: Floats) -> float:
-    """Ratio of x to the scene's own numbers where these are largest; 1 where they are 0."""
+def _factor(x: Floats, own: Floats) -> float:
+    """The power of ten nearest to the ratio of x to the scene's largest number; 1 where there is none."""
     i = int(np.argmax(np.abs(own)))
-    return float(x[i] / own[i]) if own[i] else 1.0
-
-
-def _ten(x: float) -> float:
-    """The power of ten nearest to a factor; 1 where there is none."""
-    return float(10.0 ** np.rint(np.log10(x))) if 0 < x < np.inf else 1.0
-
-
-def _kicked(scene: Scene, scheme: str, q: Floats, p: Floats, every: int, roundoff: float) -> str:
-    kick = scene.step * np.asarray(scene.system.force(q, p), np.float64)
-    for part, name in ((0.5, "half a kick"), (1.0, "a kick")):
-        for side, late, back in ((-1, "before", "add"), (1, "after", "take off")):
-            if not _is_at(scene, q[0], p[0], scene.q, scene.p + side * part * kick[0]):
-                continue
-            found = f"its momenta are {name} {late} the scene's"
-            if _follows(scene, scheme, q, p - side * part * kick, every, roundoff):
-                return (
-                    f"{found}, as leapfrog has them between the times of the positions; {back} {part:g} h "
-                    "F(q) in every frame, or see what `springcheck identify` reads"
-                )
-            if len(q) > 3 and _follows(scene, scheme, q[1:-1], p[1:-1], every, roundoff):
-                return (
-                    f"{found} there alone, and the frames after it are those of {schemes.title(scheme)}: "
-                    "differences to one side, as np.gradient has at both ends; put the scene's own there, "
-                    "and leave out the last frame if it is one"
-                )
-            return f"{found} there; see what `springcheck identify` reads of all frames"
-    return ""
-
-
-def _follows(scene: Scene, scheme: str, q: Floats, p: Floats, every: int, roundoff: float) -> bool:
-    """Whether each of the first frames leads to the next by a scheme, as far as their digits can tell it from
-    half a kick."""
-    q, p = (x[: MOST_STEPS + 1] for x in (q, p))
-    half, norm = scene.step / 2 * np.asarray(scene.system.force(q, p)), scene.system.norm
-    rounded = norm.most(*(ROUNDINGS * roundoff * np.max(np.abs(x), axis=0) for x in (q, p)))
-    close = max(CLOSE_STATE, float(rounded / norm.unit))
-    at = next(islice(_steps(scene, scheme, q[:-1], p[:-1]), every - 1, None), None)
-    right = at is not None and np.all(norm(at[0] - q[1:], at[1] - p[1:]) <= close)
-    return bool(right and 2 * close <= np.max(norm(np.zeros_like(q), half)))
-
-
-def _steps(scene: Scene, scheme: str, q: Floats, p: Floats) -> Iterator[tuple[Reals, Reals]]:
-    """States after each step of a scheme from q, p (..., n), up to one that the forces do not determine."""
-    law = schemes.Law(scheme=schemes.scheme(scheme), scene=scene, h=scene.step)
-    at: tuple[Reals, Reals] = q.astype(np.longdouble), p.astype(np.longdouble)
-    with suppress(SpringcheckError, ArithmeticError, ValueError):
-        while True:
-            at = law.step(*at)
-            yield at
-
-
-def _later(scene: Scene, scheme: str, q: Floats, p: Floats) -> str:
-    if scene.n > MOST_PARTICLES or scene.bath:
-        return ""
-    steps = islice(_steps(scene, scheme, scene.q, scene.p), min(scene.steps, MOST_STEPS))
-    for done, at in enumerate(steps, 1):
-        if _is_at(scene, q, p, *at):
-            return (
-                f"it is the scene's state after {count(done, 'step')} of {schemes.title(scheme)}; write the "
-                "start as the first frame, or give a scene that starts there"
-            )
-    return ""
-
-
-def _largest(scene: Scene, q: Floats, p: Floats) -> str:
-    parts = [("q", q, scene.q), ("p", p, scene.p)]
-    none = np.zeros_like(q)
-    sizes = [scene.system.norm(q - scene.q, none), scene.system.norm(none, p - scene.p)]
-    name, x, own = parts[int(np.argmax(sizes))]
-    i = int(np.argmax(np.abs(x - own)))
-    values = f"{x[i]:.15g} there, and {own[i]:.15g} in the scene"
-    return f"{name}[{i}] is {values}; give a scene that starts so"
+    ratio = x[i] / own[i] if own[i] else 1.0
+    return float(10.0 ** np.rint(np.log10(ratio))) if 0 < ratio < np.inf else 1.0

@@ -35,9 +35,10 @@ MOST_TURNING = 8
 """Particles among which some must turn for their motion to be called an orbit."""
 
 ORBIT_WORDS = {
-    "spirals out": "spiral out", "spirals in": "spiral in", "keeps to its orbit": "keep to their orbits",
+    "gains energy": "gain energy", "loses energy": "lose energy",
+    "conserves it on average": "conserve it on average",
 }  # fmt: skip
-"""What an orbit may do, of one scheme and of several."""
+"""What the energy may do over a run, of one scheme and of several."""
 
 CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
 """Fraction of an energy, or logarithm of its ratio to the start's, that counts as a change; fraction of a
@@ -141,7 +142,7 @@ def steady(energies: Floats, every: int) -> float:
 
 
 def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
-    """Whose orbits spiral, and the largest error of the states of others."""
+    """Who gains or loses energy over the run, and the largest error of the states of others."""
     scene = runs.scene
     said: dict[str, list[str]] = {way: [] for way in ORBIT_WORDS}
     off = {}
@@ -160,10 +161,10 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
             out = not np.isfinite(e).all() or np.min(last) > np.max(first) + unit
             # at once, or more and more; of a negative energy half is larger
             inwards = not out and np.max(last) < max(np.min(first), min(e[0], e[0] / 2)) - unit
-            way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
+            way = "gains energy" if out else "loses energy" if inwards else "conserves it on average"
             said[way].append(group.title)
     turns = max(periods(x) for x in parts.longest.q.T[:MOST_TURNING])
-    if turns >= 1 and (said["spirals out"] or said["spirals in"]):
+    if turns >= 1 and (said["gains energy"] or said["loses energy"]):
         return "; ".join(
             f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {ORBIT_WORDS[way]}"
             for way, names in said.items()

@@ -19,6 +19,9 @@ from springcheck.schemes import UNKNOWN
 
 TRUTH = "exact solution"
 
+MOST_LETTERS = 60
+"""Most characters of a figure's title; the rest of what is said stands in its small print."""
+
 MOST_LEAVING = 4
 """Schemes that are named where they leave the axes."""
 
@@ -175,9 +178,11 @@ class Runs:
         # of a long run every so many frames, between which it may be further off
         thinned = not self.errors and any(run.every > self.scene.every for run in self.every)
         few = thinned and "at most" in said
+        whole = f"{self.wrong}{said}{' (of the frames drawn)' * few}"
         return Bank(
             name=name, title="Methods drawn", charts=charts, size=size, columns=columns,
-            heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * few}",
+            heading=short(whole) or f"{self.scene.title}: {name.replace('-', ' ')}"[:MOST_LETTERS],
+            foot=f"{self.scene.title}: {whole}",
         )  # fmt: skip
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
@@ -193,6 +198,21 @@ class Runs:
         if len(said) > MOST_LEAVING:
             said = [*said[: MOST_LEAVING - 1], f"{len(said) - MOST_LEAVING + 1} more"]
         return "outside: " + ", ".join(said) if said else ""
+
+
+def short(said: str) -> str:
+    """The first findings of a sentence, as many as a title holds; "" where not even one fits."""
+    out = ""
+    for whole in said.partition(" (phase")[0].split("; "):
+        part = whole
+        if not out and len(whole) > MOST_LETTERS:
+            # without whose the numbers are
+            part = "".join(x.rpartition(")")[2] if i else x for i, x in enumerate(whole.split(" (")))
+        longer = f"{out}; {part}" if out else part
+        if len(longer) > MOST_LETTERS:
+            break
+        out = longer
+    return out[:1].upper() + out[1:] if ":" not in out.split(" ")[0] else out
 
 
 def exact_curve(x: Floats, y: Floats) -> Curve:

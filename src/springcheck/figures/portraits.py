@@ -44,7 +44,7 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, sai
     """Momentum over position, or what else a view shows: a chart for each; `said` is the finding."""
     charts = [_portrait(runs, view, truth, alone=len(shown) == 1) for view in shown]
     what = "path" if shown[0].what == "path" else "phase portrait"
-    planes = what == "path" and len(charts) == 3
+    planes = len(charts) == 3 and all(chart.equal for chart in charts)
     size = (4.0, 3.6) if planes else _size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4)))
     said = _heading(f"{what}{_of(runs, shown)}{runs.part}", said)
     return runs.bank(what.replace(" ", "-"), charts, said, size, columns=3 if planes else min(2, len(charts)))
@@ -95,7 +95,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     start = view.pick(runs.scene.q[None], runs.scene.p[None])
     begin = Curve(name="start", group=BEGIN, x=start[0], y=start[1], line=False, marks=True)
     sizes = xs.half, ys.half
-    square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
+    square = view.what in ("path", "mode") or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked[runs.every[0].label] if true is None else true) is None else ""
     of = f" of {view.title}" if view.title and view.what != "path" else ""

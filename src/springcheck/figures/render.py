@@ -131,9 +131,14 @@ def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None
             axes.tick_params(labelleft=False)
 
 
+LONGEST_TITLE = 1000
+"""Characters of a heading: matplotlib lays out a hundred thousand for minutes."""
+
+
 def _heading(figure: Figure, text: str, width: int) -> None:
     # a number keeps its unit, and a name its hyphen
-    kept = textwrap.fill(text.replace(" %", "\0%"), width, break_on_hyphens=False).replace("\0", " ")
+    joined = text[:LONGEST_TITLE].replace(" %", "\0%")
+    kept = textwrap.fill(joined, width, break_on_hyphens=False).replace("\0", " ")
     figure.suptitle(kept, x=0.02, ha="left", fontsize=10)
 
 

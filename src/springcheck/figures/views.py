@@ -16,6 +16,9 @@ from springcheck.physics.terms import Cosine
 MOST_PANELS = 4
 """Particles up to which each has a panel of its own."""
 
+WEAK_MODE = 1e-9
+"""Part of the largest energy of a mode from which on a mode is drawn."""
+
 State = tuple[Floats, Floats]
 
 
@@ -131,8 +134,15 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
             )
         return [_single(scene, particle)]
     # two particles that are bound to each other and to nothing else
-    if scene.n == scene.particles == 2 and scene.terms and all(term.bodies == 2 for term in scene.terms):
-        return [_bond(scene)]
+    joined = scene.terms and all(term.bodies == 2 for term in scene.terms)
+    if scene.particles == 2 and joined and scene.bath is None:
+        return [_bond(scene) if scene.n == 2 else _bond_in_space(scene)]
+    system = scene.system
+    if scene.n == scene.particles > 2 and not system.is_separate and system.has_modes and scene.bath is None:
+        y, v = (x[0] for x in system.modes.about_centres(scene.q[None], scene.p[None]))
+        energies = np.asarray(v * v + np.abs(system.modes.w2) * y * y, np.float64)
+        strongest = np.argsort(-energies, kind="stable")[:MOST_PANELS]
+        return [_mode(scene, int(i)) for i in strongest if energies[i] > WEAK_MODE * np.max(energies)]
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]
 
 
@@ -228,3 +238,50 @@ def _bond(scene: Scene) -> View:
         potential=potential,
         mass=mass,
     )
+
+
+def _mode(scene: Scene, i: int) -> View:
+    """A normal mode of a chain: on a circle, unless it gains or loses energy."""
+    modes = scene.system.modes
+    one = np.zeros((1, scene.n), np.longdouble)
+    one[0, i] = 1
+    # its shape, by which the modes of a long chain cost no transform of every frame
+    shape = np.asarray((modes.from_centres(one, 0 * one)[0] - modes.rest)[0], np.float64)
+    rest, w = np.asarray(modes.rest, np.float64), float(np.sqrt(max(float(modes.w2[i]), 0.0)))
+    number = int(np.sum(modes.w2 < modes.w2[i])) + 1
+
+    def pick(q: Reals, p: Reals) -> State:
+        with np.errstate(over="ignore", invalid="ignore"):
+            y = np.asarray(q, np.float64) - rest
+            return (w or 1.0) * (y * scene.m) @ shape, np.asarray(p, np.float64) @ shape
+
+    return View(
+        title=f"mode {number} of {scene.n}", what="mode", x_name="\u03c9 times its position", x_unit="",
+        y_name="its velocity", y_unit="", pick=pick,
+    )  # fmt: skip
+
+
+def _bond_in_space(scene: Scene) -> View:
+    """The length of the bond of two particles in space, and the momentum along it."""
+    assert scene.places is not None
+    unit, axes = units(scene), scene.places % 3
+    ends = [scene.places // 3 == k for k in (0, 1)]
+    m = [float(scene.m[here][0]) for here in ends]
+    mass = m[0] * m[1] / (m[0] + m[1])
+
+    def apart(x: Reals) -> Floats:
+        out = np.zeros((2, len(x), 3))
+        for k, here in enumerate(ends):
+            out[k][:, axes[here]] = np.asarray(x, np.float64)[:, here]
+        return np.asarray(out[1] - out[0])
+
+    def pick(q: Reals, p: Reals) -> State:
+        with np.errstate(all="ignore"):
+            way, moving = apart(q), apart(np.asarray(p) / scene.m)
+            length = np.sqrt(np.sum(way**2, axis=1))
+            return length, mass * np.sum(way * moving, axis=1) / length
+
+    return View(
+        title="the bond", what="length", x_name="length of the bond", y_name="momentum along the bond",
+        x_unit=unit.q, y_unit=unit.p, pick=pick, mass=mass,
+    )  # fmt: skip

@@ -1,7 +1,8 @@
 """Trajectories of other programs, recognised by their content, not by their names.
 
-What our own code reads (texts, NPY, NPZ) is bounded as it is read; what a library reads is read in a child
-process (see `springcheck.store.apart`).
+What a library reads, packed texts and long files are read in a child process (see `springcheck.store.apart`);
+short texts and arrays here, in time that grows with their length alone.  A new format is a row of `FORMATS`
+and a function that returns its `States`.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats import libraries, molecular, numbers, octave, tables
+from springcheck.formats import libraries, molecular, numbers, tables
 from springcheck.formats.columns import Fixed, Reader, States, fitting, moving
 from springcheck.formats.hdf5 import is_foreign, read_hdf5
 from springcheck.store import apart, files
@@ -29,6 +30,8 @@ from springcheck.store import apart, files
 __all__ = ["BY_NAME", "FORMATS", "States", "is_hdf5", "is_store", "moving", "read"]
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
+SHORT = 1 << 20
+"""Bytes of a file that our own code reads within this process: a second's work at most."""
 BEGINNING = 1 << 12
 """Bytes at the beginning of a file by which its format is recognised."""
 
@@ -57,6 +60,13 @@ def _matches(pattern: bytes) -> Callable[[bytes, Path], bool]:
     return lambda head, path: re.search(pattern, head, re.MULTILINE) is not None
 
 
+def _not_read(what: str) -> Reader:
+    def refuse(path: Path, columns: list[str], step: float | None) -> States:
+        raise StoreError(f"{path}: is {what}")
+
+    return refuse
+
+
 FORMATS: tuple[Format, ...] = (
     Format("NPY", _starts(b"\x93NUMPY"), numbers.read_npy),
     Format(".xlsx", _matches(XLSX), partial(libraries.read_pandas, "read_excel"), LIBRARY),
@@ -66,16 +76,16 @@ FORMATS: tuple[Format, ...] = (
     Format("MATLAB .mat", _starts(b"MATLAB 5.0"), libraries.read_mat, LIBRARY),
     Format("JSON", _matches(rb"\A\s*(\{|\[\s*[\[{]|\[[^][]*\]\s*\[)"), libraries.read_json, LIBRARY),
     Format("LAMMPS dump", _starts(b"ITEM: "), molecular.read_lammps, LINES),
-    Format("LAMMPS log", _matches(rb"^LAMMPS \("), molecular.read_log, LINES),
     Format("DCD", lambda head, path: head[4:8] == b"CORD", libraries.read_dcd, LIBRARY),
     Format("GROMACS .xtc", _starts(b"\0\0\x07\xcb", b"\0\0\x07\xe7"), libraries.read_xtc, LIBRARY),
     Format(".trr", _starts(b"\0\0\x07\xc9"), molecular.read_trr),
-    Format(".gro", lambda head, path: ".gro" in path.suffixes, molecular.read_gro, LINES),
     Format("Amber NetCDF", _starts(b"CDF\x01", b"CDF\x02"), libraries.read_amber, LIBRARY),
     Format("ASE .traj", _starts(b"- of Ulm"), libraries.read_ase, LIBRARY),
-    Format("extended .xyz", _matches(molecular.COUNT + rb".*Properties="), libraries.read_ase, LIBRARY),
-    Format(".xyz", _matches(molecular.XYZ), molecular.read_xyz, LINES),
-    Format("Octave text", _matches(rb"^# name: .*\n# type: "), octave.read_octave, LINES),
+    Format("extended .xyz", lambda head, path: b"Properties=" in head[:1000], libraries.read_ase, LIBRARY),
+    Format(".xyz", lambda head, path: molecular.is_xyz(head), molecular.read_xyz, LINES),
+    Format("", _starts(b"LAMMPS ("), _not_read("a log of LAMMPS: dump x y z vx vy vz instead"), LINES),
+    Format("", _starts(b"# Created by Octave"), _not_read("a text of Octave: save -v7 instead"), LINES),
+    Format("", lambda head, path: ".gro" in path.suffixes, _not_read("a .gro file: use .trr instead"), LINES),
     Format("text tables", lambda head, path: True, tables.read_table, LINES),
 )
 """In the order in which they are tried; a file that no other format matches is a text table."""
@@ -83,7 +93,7 @@ FORMATS: tuple[Format, ...] = (
 OF_DECIMALS = "half_q", "half_v", "beside"
 """Names of the parts of `Fixed` in what a library has read."""
 
-BY_NAME = {one.name: one for one in FORMATS}
+BY_NAME = {one.name: one for one in FORMATS if one.name}
 KNOWN = f"read are HDF5, {', '.join(BY_NAME)}, texts gzipped too"
 
 
@@ -126,7 +136,8 @@ def _read(path: Path, columns: list[str], step: float | None) -> States:
                 head = file.read(BEGINNING)
         head = head.removeprefix(BOM_UTF8)
         found = next(one for one in FORMATS if one.recognise(head, path) and (one.by == LINES or not zipped))
-        return _apart(found, path, columns, step) if found.by == LIBRARY else found.read(path, columns, step)
+        bounded = found.by == LIBRARY or zipped or path.stat().st_size > SHORT
+        return _apart(found, path, columns, step) if bounded else found.read(path, columns, step)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise StoreError(f"{path}: what gzip has packed is damaged or cut off ({error})") from error
     except UnicodeDecodeError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -27,9 +28,6 @@ NAMES: dict[Kind, str] = {
     "m": r"m|mass|masses",
 }
 
-
-STEPS = r"(?i)\s*(time)?steps?\s*"
-"""Name of a column that counts steps."""
 
 FEWEST_SINGLE, FEW_ROWS, SHORT = 8, 1000, 0xFFF
 """Evidence that numbers are of single precision: so many different ones in so many rows, and bits among the
@@ -103,11 +101,17 @@ def moving(path: Path, found: States) -> States:
     return found
 
 
+@lru_cache(maxsize=4096)
 def kind(name: str) -> Kind | None:
     """Quantity that a column of this name holds; units in brackets, numbers and case are ignored."""
     bare, _ = _parted(name)
     found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, bare)]
     return found[0] if found else None
+
+
+def counts_steps(name: str) -> bool:
+    """Whether a column of this name counts steps."""
+    return name.strip().lower() in ("step", "steps", "timestep", "timesteps")
 
 
 def kinds(names: Collection[str]) -> dict[str, Kind]:
@@ -118,7 +122,7 @@ def kinds(names: Collection[str]) -> dict[str, Kind]:
     """
     found = {name: what for name in names if (what := kind(name)) is not None}
     small = {what for name, what in found.items() if not _is_capital(name)}
-    if any(re.fullmatch(STEPS, name) for name in names):
+    if any(counts_steps(name) for name in names):
         small.add("t")
     if small & {"p", "v"}:
         small |= {"p", "v"}
@@ -126,7 +130,7 @@ def kinds(names: Collection[str]) -> dict[str, Kind]:
 
 
 def _is_capital(name: str) -> bool:
-    bare = _without_unit(name)
+    bare = _without_unit(name[:LONGEST_NAME])
     return len(bare) == 1 and bare.isupper()
 
 

@@ -5,7 +5,6 @@ Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Am
 
 from __future__ import annotations
 
-import re
 import warnings
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
@@ -91,7 +90,10 @@ def _written(lines: list[str], of_momenta: Floats) -> tuple[float, Fixed | None]
     if len({len(row) for row in rows}) != 1:
         return 2.0**-53, None
     places, end = dict[str, range](), 0
-    for name, width in re.findall(r"(\w+):[A-Z]:(\d+)", lines[1]):
+    # Properties=species:S:1:pos:R:3
+    said = lines[1].partition("Properties=")[2].split()[:1]
+    words = said[0].strip('"').split(":") if said else []
+    for name, width in zip(words[::3], words[2::3], strict=False):
         places[name.lower()] = range(end, end := end + int(width))
     bare = next((x for name, x in places.items() if name in VELOCITIES), None)
     v = bare or places.get("momenta", range(0))
@@ -173,7 +175,7 @@ def read_json(path: Path, columns: list[str], step: float | None) -> States:
     if isinstance(found, list):
         try:
             rows = np.asarray(found, np.float64)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             rows = np.empty(0)
         if rows.ndim == 2 and rows.size:
             return of_table(path, rows, columns)
@@ -186,7 +188,7 @@ def read_json(path: Path, columns: list[str], step: float | None) -> States:
         if isinstance(values, list):
             try:
                 arrays[str(name)] = np.asarray(values, np.float64)
-            except (ValueError, TypeError):
+            except (ValueError, TypeError, OverflowError):
                 arrays[str(name)] = np.array([*values, None], object)[:-1]
     return states_of(path, arrays, columns)
 

@@ -1,25 +1,23 @@
-"""Files of molecular programs: LAMMPS dumps and logs, GROMACS .gro and .trr, plain .xyz.
+"""Files of molecular programs that no library reads in full precision: LAMMPS dumps, .trr, plain .xyz.
 
 Each in its own units: GROMACS' are nm, ps and u, those of a dump are LAMMPS' own.
 """
 
 from __future__ import annotations
 
-import re
 import struct
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import ALONE, Fixed, Floats, States, kind, listed, times
+from springcheck.formats.columns import Fixed, Floats, States, times
 from springcheck.formats.lines import MOST_NUMBERS, Lines, number
-from springcheck.formats.tables import SHOWN, fixed, of_rows, roundoff
+from springcheck.formats.tables import SHOWN, fixed, roundoff
 
 
 def clock(path: Path, said: Sequence[float | None], step: float | None, unit: str = "") -> Floats:
@@ -147,107 +145,11 @@ def _wanted(path: Path, names: list[str]) -> dict[str, int]:
     return {name: names.index(name) for name in (*wanted, "mass", "id", *images) if name in names}
 
 
-def read_log(path: Path, columns: list[str], step: float | None) -> States:
-    """Thermodynamic output of a LAMMPS log: Step or Time, v_... .
-
-    Runs whose columns mean what those of the first one with positions do are read, others are noted.
-    """
-    runs: list[tuple[list[str], array[float], list[list[str]]]] = []
-    within = False
-    with _frames(path, "LAMMPS log") as lines:
-        for line in lines:
-            cells = line.split()
-            if cells[:1] == ["Step"]:
-                runs.append((cells, array("d"), []))
-                within = True
-            elif cells[:3] == ["Loop", "time", "of"]:
-                within = False
-            elif within and len(cells) == len(runs[-1][0]) and re.match(r"[-+.\d]", cells[0]):
-                lines.count(len(cells))
-                runs[-1][1].extend(number(cell) for cell in cells)
-                if len(runs[-1][2]) < SHOWN:
-                    runs[-1][2].append(cells)
-    runs = [run for run in runs if run[1]]
-    if not runs:
-        raise StoreError(f"{path}: this LAMMPS log has no thermodynamic output that begins with Step")
-    wanted = next((found for header, *_ in runs if (found := _read_of(header, columns))), runs[0][0])
-    parts: list[Floats] = []
-    first: list[list[str]] = []
-    notes = []
-    for header, numbers, shown in runs:
-        values = np.frombuffer(numbers).reshape(-1, len(header))
-        if not set(wanted) <= set(header) or (columns and header != wanted):
-            steps = f"steps {values[0, 0]:.0f} to {values[-1, 0]:.0f}"
-            notes.append(f"{steps} are left out: their columns are {listed(header)}")
-            continue
-        places = [header.index(name) for name in wanted]
-        # a run begins with the frame that the last one ended with
-        again = bool(parts) and values[0, 0] == parts[-1][-1, 0]
-        parts.append(values[int(again) :, places])
-        first += [[cells[i] for i in places] for cells in shown]
-    values = np.concatenate(parts)
-    names = columns or [_bare(name) for name in wanted]
-    if not columns and "Time" not in wanted:
-        values[:, 0] = times(path, values[:, 0], step)
-        names[0] = "t"
-    return replace(of_rows(path, values, first, names, []), notes=tuple(notes))
-
-
-def _bare(name: str) -> str:
-    """A column's name without LAMMPS' prefix of a variable, a compute or a fix."""
-    return re.sub(r"^[vcf]_", "", name)
-
-
-def _read_of(header: list[str], columns: list[str]) -> list[str]:
-    """The columns of a run that are read, all of them where they were named; none where it has no
-    positions."""
-    kinds = [kind(_bare(name)) for name in header]
-    if columns:
-        return header if len(columns) == len(header) else []
-    return [x for x, what in zip(header, kinds, strict=True) if what or x == "Step"] if "q" in kinds else []
-
-
-def read_gro(path: Path, columns: list[str], step: float | None) -> States:
-    """Frames of a .gro file with velocities; the times are in their titles."""
-    t: list[float | None] = []
-    numbers = array("d")
-    n: int | None = None
-    wide = thin = 0
-    with _frames(path, ".gro frame") as lines:
-        for title in lines:
-            if not title.strip():
-                break
-            n = _atoms(next(lines), lines, n)
-            said = re.search(r".*\bt=\s*([-+.\deE]+)", title)
-            t.append(float(said[1]) if said else None)
-            for atom in range(n):
-                row = next(lines)
-                if not (atom or wide):
-                    # the distance between decimal points is the width of the columns
-                    points = [j for j, c in enumerate(row) if c == "."]
-                    if len(points) < 6:
-                        raise StoreError(f"{path}: holds no velocities; {ALONE}")
-                    wide, thin = points[1] - points[0], points[4] - points[3]
-                at = 20 + 3 * wide
-                cells = [row[20 + k * wide : 20 + (k + 1) * wide] for k in range(3)]
-                cells += [row[at + k * thin : at + (k + 1) * thin] for k in range(3)]
-                numbers.extend(map(float, cells))
-            next(lines)
-    table = np.frombuffer(numbers).reshape(len(t), n or 1, 6)
-    q, v = table[:, :, :3], table[:, :, 3:]
-    # decimals are fixed: 3 of positions and 4 of velocities unless GROMACS is told otherwise
-    sizes = (float(np.max(np.abs(q), initial=0)), float(np.max(np.abs(v), initial=0)))
-    halves = 0.5 * 10.0 ** (5 - wide), 0.5 * 10.0 ** (4 - thin)
-    written = max([half / size for half, size in zip(halves, sizes, strict=True) if size > 0], default=1.0)
-    single = all(np.all(np.abs(np.float32(x) - x) <= half) for x, half in zip((q, v), halves, strict=True))
-    of_all = Fixed(*halves, 2.0**-24 if single else 2.0**-53)
-    return of_frames(path, clock(path, t, step, "ps"), q, v, None, written, of_all)
-
-
-COUNT = rb"\A[^\S\n]*\d+[^\S\n]*\n"
-"""Extended and plain .xyz begin with a line of one number."""
-XYZ = COUNT + rb".*\n[^\S\n]*[A-Za-z]{1,8}\d*[^\S\n]+[-+.\d]"
-"""Plain .xyz continues with a comment and an atom of a name and numbers."""
+def is_xyz(head: bytes) -> bool:
+    """Whether a text begins as .xyz does: a number, a comment, and an atom of a name and numbers."""
+    number_, _, rest = head.partition(b"\n")
+    atom = rest.partition(b"\n")[2].split(b"\n")[0].split()
+    return number_.strip().isdigit() and len(atom) > 3 and atom[0][:1].isalpha() and len(atom[0]) < 12
 
 
 def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
@@ -265,8 +167,7 @@ def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
             if not line.strip():
                 continue
             n = _atoms(line, lines, n)
-            comment = re.search(r"\b(?:t|time)\s*[=:]\s*([-+.\deEdD]+)", next(lines)[:1000], re.IGNORECASE)
-            t.append(number(comment[1]) if comment else None)
+            t.append(_time(next(lines)))
             for _ in range(n):
                 cells = next(lines).split()[1:]
                 width = width or (6 if len(cells) >= 6 else 3)
@@ -277,8 +178,20 @@ def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
                     first.append(cells[:width])
     table = np.frombuffer(numbers).reshape(len(t), n or 1, width or 3)
     v = table[:, :, 3:] if width == 6 else None
-    told = roundoff(first, range(width)), fixed(first, range(3), range(3, width))
-    return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, *told)
+    known = roundoff(first, range(width)), fixed(first, range(3), range(3, width))
+    return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, *known)
+
+
+def _time(comment: str) -> float | None:
+    """The time in a comment such as ``t = 0.1`` or ``step 3, Time: 0.3 ps``; None where it has none."""
+    words = comment[:1000].replace("=", " = ").replace(":", " = ").replace(",", " ").split()
+    for name, sign, value in zip(words, words[1:], words[2:], strict=False):
+        if name.lower() in ("t", "time") and sign == "=":
+            try:
+                return number(value)
+            except ValueError:
+                return None
+    return None
 
 
 TRR_MARK = 1993

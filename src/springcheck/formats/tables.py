@@ -11,7 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import STEPS, Fixed, Floats, States, kinds, listed, named, split, times
+from springcheck.formats.columns import (
+    Fixed,
+    Floats,
+    States,
+    counts_steps,
+    kinds,
+    listed,
+    named,
+    split,
+    times,
+)
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -25,8 +35,6 @@ AS_WIDE = 0.75
 last digits are zeros by chance, and may be left out."""
 COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
-GRACE_NAME = re.compile(r"\s*@\s*(?:xaxis\s+label|s\d+\s+legend)\s+(\".*\")")
-"""Line of a Grace file (.xvg of GROMACS) that names its next column; others with an @ are its layout."""
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
@@ -46,7 +54,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             if width == 1 and len(first) == SHOWN:
                 break  # the message is the same, however many follow
             if not width and line.lstrip().startswith("@"):
-                legends += map(_bare, GRACE_NAME.findall(line))
+                legends += _legend(line)
                 continue
             cells, is_comment = _cells(line), line.lstrip().startswith(COMMENT)
             row = _numbers(cells)
@@ -81,6 +89,14 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     return replace(states, notes=(*states.notes, *([units] if units else [])))
 
 
+def _legend(line: str) -> list[str]:
+    """Name of the next column in a line of a Grace file (.xvg of GROMACS); most lines with @ name none."""
+    words = line[:1000].replace("@", " ", 1).split(None, 2)
+    axis = words[:2] == ["xaxis", "label"]
+    curve = len(words) == 3 and words[0][:1] == "s" and words[0][1:].isdecimal() and words[1] == "legend"
+    return [_bare(words[2])] if len(words) == 3 and (axis or curve) else []
+
+
 def of_rows(
     path: Path, values: Floats, first: Sequence[Sequence[str]], names: list[str], header: list[str],
     step: float | None = None,
@@ -96,7 +112,7 @@ def of_rows(
     ):
         header = ["", *header]
     chosen = names or header
-    counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(STEPS, name)]
+    counted = [i for i, name in enumerate(chosen[:width]) if counts_steps(name)]
     if counted and "t" not in kinds(chosen).values():
         i, values, chosen = counted[0], values.copy(), [*chosen]
         values[:, i], chosen[i] = times(path, values[:, i], step), "t"

@@ -88,7 +88,7 @@ class Cosine(OnParticles):
     formula: ClassVar[str] = "depth (1 - cos(wave (q - at)))"
     columns: ClassVar[tuple[Column, ...]] = (
         Column("depth", "depth"),
-        Column("length", "wave", 1.0, sign="positive", inverse=True),
+        Column("wave", "wave", 1.0, sign="positive"),
         Column("at", "at", 0.0),
     )
     depth: Floats

@@ -11,7 +11,7 @@ from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import need_space
 from springcheck.store.journal import Journal, open_new
-from springcheck.store.layout import size
+from springcheck.store.layout import need_names, size
 from springcheck.store.reading import (
     Summary,
     comparison,
@@ -35,6 +35,6 @@ from springcheck.store.tables import Table
 __all__ = [
     "Draft", "Damage", "Journal", "Run", "Solution", "StoreError", "StoreWarning", "Summary", "Table",
     "attributes", "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export",
-    "machine", "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources", "strided",
-    "summary", "tables_of", "verdicts", "windows",
+    "machine", "need_names", "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources",
+    "strided", "summary", "tables_of", "verdicts", "windows",
 ]  # fmt: skip

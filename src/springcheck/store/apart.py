@@ -15,7 +15,7 @@ from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
-from springcheck.errors import StoreError
+from springcheck.errors import SpringcheckError, StoreError
 from springcheck.processes import called
 from springcheck.store import files
 
@@ -92,7 +92,9 @@ def read(module: str, function: str, path: Path, *words: str) -> bytes:
     except subprocess.TimeoutExpired:
         raise EndedError("does not end") from None
     except OSError as error:
-        raise StoreError(f"cannot read {path}: no process can be started ({files.cause(error)})") from error
+        # no fault of the file
+        why = f"{path} is read in a process of its own, and none can be started: {files.cause(error)}"
+        raise SpringcheckError(why) from error
     if done.returncode:
         raise EndedError(
             f"crashes its library, or asks for more than {limit:.0f} s or {MEMORY >> 30} GiB of memory"

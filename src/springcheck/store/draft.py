@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from contextlib import ExitStack
-from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
 
@@ -146,7 +145,7 @@ class Draft:
                 **({} if self.scene.places is None else {"axes": layout.axes_of(self.scene)}),
                 "quantities": " ".join(n for n in layout.QUANTITIES if n in self._columns),
                 "sequence": self.sequence,
-                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+                "finished": records.now(),
                 "sha256": digest,
             }
             parameters = file.create_group(f"parameters/{self.label}")

@@ -103,6 +103,14 @@ def check_label(label: str) -> None:
         )
 
 
+def need_names(trajectories: int) -> None:
+    """Raise StoreError for more trajectories than a store can hold."""
+    if trajectories > access.MOST_MEMBERS:
+        raise StoreError(
+            f"{trajectories} trajectories: a store holds at most {access.MOST_MEMBERS}; run fewer methods"
+        )
+
+
 def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
     """The shape of one of the quantities."""
     return (frames, n) if name in ("q", "p") else (frames,)

@@ -6,8 +6,10 @@ import contextlib
 import math
 import os
 import platform
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from operator import attrgetter
 from typing import Annotated, Any, Literal, get_type_hints
@@ -130,6 +132,14 @@ def trajectory(run: Run, arrays: Mapping[str, Floats], stride: int = 1) -> Traje
         origin={key[7:]: str(value) for key, value in run.parameters.items() if key.startswith("origin.")},
         **parts[""],
     )
+
+
+def now() -> str:
+    """The time in UTC, in seconds since 1970 where the clock shows a year that dates do not have."""
+    try:
+        return datetime.now(UTC).isoformat(timespec="seconds")
+    except (ValueError, OverflowError, OSError):
+        return f"{time.time():.0f} s after 1970"
 
 
 @cache

@@ -37,8 +37,9 @@ __all__ = [
 T = TypeVar("T")
 
 open_new, need_space, size = store.open_new, store.need_space, store.size
+need_names = store.need_names
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
-digest, attributes = store.digest, store.attributes
+digest, attributes, decoded = store.digest, store.attributes, store.decoded
 tables, verdicts, comparison = store.tables_of, store.verdicts, store.comparison
 """Functions of `store` on trajectories, which are written and read in pieces, and on results."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, schemes, store
-from springcheck.checks import compare
-from springcheck.checks.compare import EXACT, Same
-from springcheck.cli import explain, inspect
+from springcheck.cli import inspect
 from springcheck.cli.page import given
 from springcheck.errors import SpringcheckError
 from springcheck.figures import charts
@@ -24,44 +21,41 @@ from springcheck.figures.views import MOST_PANELS
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Comparison, Verdict
+from springcheck.physics.trajectory import Verdict
 from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
 from springcheck.studies.run.page import banks
 from springcheck.studies.run.result import Stored
-from springcheck.text.lines import TextTable
+from springcheck.text.lines import Lines, TextTable
 from springcheck.text.wording import STATES_SHOW
 
 
-def sections(summary: Summary) -> tuple[list[dict[str, Any]], dict[str, Any], Stored | None]:
-    """The studies of a store other than trajectories, the data of all their charts by name, and its run."""
+def sections(summary: Summary) -> tuple[list[dict[str, Any]], dict[str, Any], Stored | None, Lines]:
+    """The studies of a store other than trajectories, the data of all their charts by name, its run, and the
+    tables of the run as `inspect` prints them."""
     found: list[dict[str, Any]] = []
     data: dict[str, Any] = {}
-    run = None
+    run, tables = None, Lines()
     for study, result in inspect.held(summary):
+        lines = study.lines(result, path=summary.path)
+        blocks = [line for line in lines if isinstance(line, TextTable) or str(line).strip()]
         if isinstance(result, Stored):
             run = result
+            # what is above its first table stands in the page's head
+            first = next((i for i, line in enumerate(blocks) if isinstance(line, TextTable)), len(blocks))
+            tables = blocks[first:]
             continue
         mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(study.banks(result))}
         data |= mine
-        lines = study.lines(result, path=summary.path)
-        found.append(
-            {
-                "name": study.name,
-                "title": study.about[:1].upper() + study.about[1:],
-                "blocks": [line for line in lines if isinstance(line, TextTable) or str(line).strip()],
-                "banks": list(mine),
-            }
-        )
-    return found, data, run
+        title = study.about[:1].upper() + study.about[1:]
+        found.append({"name": study.name, "title": title, "blocks": blocks, "banks": list(mine)})
+    return found, data, run, tables
 
 
 PAGE_NUMBERS = 12_000
 """Most doubles in a page, at about 20 bytes each; longer data are strided."""
 FEWEST_SHOWN = 50
 """Frames of each trajectory that are always included."""
-TAIL_FRAMES = 1 << 20
-"""Frames at the end of a run by which runs are compared as one motion, as in `run`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +68,7 @@ class Passed:
 
     @property
     def found(self) -> str:
-        """What its states show, the first check that failed, and why."""
+        """The diagnosis, the first check that failed, and why."""
         first = next((v for v in self.verdicts if v.passed is False), None)
         if first is None:
             return ""
@@ -110,13 +104,8 @@ class Content:
     summary: Summary
     not_trusted: tuple[Damage, ...]
     methods: tuple[Passed, ...]
-    explained: Mapping[str, tuple[str, tuple[str, ...]]]
-    """Description of each check among the verdicts, as a sentence and as lines."""
-    same: tuple[Same, ...] | None
-    """None where it is unknown: a scheme that is not installed, or states that were not recorded."""
-    comparison: Comparison | None
-    sha256: str
-    """SHA-256 of the file; empty where the run has not ended."""
+    result: Lines
+    """Tables of the run, as `inspect` prints them."""
     stride: int
     """Stride of the stored frames in the page."""
     data: Mapping[str, Any]
@@ -131,7 +120,7 @@ class Content:
     def finding(self) -> str:
         """Heading of its first chart, or else its title."""
         banks = iter(self.data["banks"].values())
-        found = str(self.data["banks"].get("motion", next(banks, {})).get("heading", ""))
+        found = str(self.data["banks"].get("motion", next(banks, {})).get("foot", ""))
         return found.partition(" (phase portrait")[0] or self.title
 
     @property
@@ -152,7 +141,7 @@ class Content:
 def gather(path: Path, doubts: Sequence[Damage] | None = None) -> Content:
     """The contents of a report; `doubts` as far as known.  SpringcheckError without trajectory and study."""
     summary = store.summary(path)
-    studies, banks, run = sections(summary)
+    studies, banks, run, result = sections(summary)
     if not summary.runs and not studies:
         rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
         raise SpringcheckError(f"{path}: holds no trajectory and no study to report{rest}")
@@ -162,7 +151,7 @@ def gather(path: Path, doubts: Sequence[Damage] | None = None) -> Content:
     rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
     most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(summary.runs))))
     pieces = {one.label: store.strided(path, one.label, most) for one in summary.runs}
-    verdicts, comparison = (run.verdicts, run.comparison) if run else ((), None)
+    verdicts = run.verdicts if run else ()
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
     if run and summary.runs and (motion := _motion(run, most)):
         banks["motion"] = motion
@@ -176,14 +165,7 @@ def gather(path: Path, doubts: Sequence[Damage] | None = None) -> Content:
         not_trusted=tuple(store.doubts(path) if doubts is None else doubts),
         # failures come first
         methods=tuple(sorted(_methods(summary, verdicts), key=lambda one: not one.count(False))),
-        explained={
-            check.name: (check.sentence, tuple(explain.check_lines(check)))
-            for check in checks.ALL
-            if any(verdict.check == check.name for verdict in verdicts)
-        },
-        same=_same(path, scene, comparison) if scene else None,
-        comparison=comparison,
-        sha256=_digest(path) if path.is_file() else "",
+        result=result,
         stride=max((stride for _, stride in pieces.values()), default=1),
         data=given.to_scripts(scene if summary.runs else None, [piece for piece, _ in pieces.values()], wrong)
         | {"banks": banks},
@@ -209,7 +191,8 @@ def _motion(run: Stored, most: int) -> dict[str, Any] | None:
         replace(
             chart,
             # what is said of modes is of the last, the fastest
-            title=f"{bank.heading}. " * (chart is bank.charts[-(bank.name == "modes")]) + chart.title,
+            title=f"{bank.foot or bank.heading}. " * (chart is bank.charts[-(bank.name == "modes")])
+            + chart.title,
             curves=[replace(curve, x=few(curve.x), y=few(curve.y)) for curve in chart.curves],
         )
         for bank in found
@@ -217,7 +200,13 @@ def _motion(run: Stored, most: int) -> dict[str, Any] | None:
     ]
     on = [curve.name for curve in curves if not curve.over] + [chart.title for chart in charts]
     return charts_as_data(
-        Bank(title="Methods drawn", heading=found[0].heading, charts=charts, on=list(dict.fromkeys(on)))
+        Bank(
+            title="Methods drawn",
+            heading=found[0].heading,
+            foot=found[0].foot,
+            charts=charts,
+            on=list(dict.fromkeys(on)),
+        )
     )
 
 
@@ -237,21 +226,3 @@ def _methods(summary: Summary, verdicts: Sequence[Verdict]) -> Iterator[Passed]:
     for label in dict.fromkeys((*titles, *(verdict.method for verdict in verdicts))):
         mine = tuple(verdict for verdict in verdicts if verdict.method == label)
         yield Passed(method=label, scheme=titles.get(label, ""), verdicts=mine)
-
-
-def _same(path: Path, scene: Scene, comparison: Comparison | None) -> tuple[Same, ...] | None:
-    """Which runs are one motion, as `run` reports it."""
-    if comparison is None:
-        return None
-    ends = {label: store.end(path, label, TAIL_FRAMES) for label in comparison.labels if label != EXACT}
-    if any(not len(run.q) or not len(run.p) for run in ends.values()):
-        return None
-    try:
-        return tuple(compare.same_motions(scene, ends, comparison))
-    except (SpringcheckError, KeyError):
-        return None
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

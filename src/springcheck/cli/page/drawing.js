@@ -19,9 +19,8 @@ const element = (name, attributes, ...children) =>
 const by = (id) => document.getElementById(id);
 const number = (x, digits = 3) => String(Number(x.toPrecision(Math.min(17, Math.max(1, digits)))));
 const colourOf = (look) => look.colours[Number(DARK.matches)];
-// What failed keeps its colour in print.
-const shaped = (kind, d, look, more) => element("path", { class: look.failed ? `${kind} failed` : kind, d,
-  style: { stroke: colourOf(look), "--printed": look.printed || "none" }, ...more });
+const shaped = (kind, d, look, more) =>
+  element("path", { class: kind, d, style: { stroke: colourOf(look) }, ...more });
 const marked = (d, look) => shaped("marks", d, look);
 const stroked = (d, look) => shaped("curve", d, look, { "stroke-dasharray": look.dash });
 
@@ -29,30 +28,6 @@ const stroked = (d, look) => shaped("curve", d, look, { "stroke-dasharray": look
 function tile(name, shade, attributes) {
   const fill = shade[0] === "#" ? shade : `var(--${/^s\d/.test(shade) ? "" : "t-"}${shade})`;
   return element(name, { class: "tile", ...attributes, style: { fill } });
-}
-
-// `now` follows sliders and their fields where a value is `right`.  Returns what sets one, what shows all.
-function sliding(prefix, places, now, right, show) {
-  const [slide, field] = ["slide", "show"].map((kind) => (name) => by(`${kind}-${prefix}${name}`));
-  const put = (name, value) => {
-    if (!Number.isFinite(value) || !right(name, value)) return;
-    const away = places[name].map((x) => Math.abs(x - value));
-    slide(name).value = away.indexOf(Math.min(...away));
-    now[name] = value;
-  };
-  const tell = () => {
-    for (const name in places) {
-      field(name).value = number(now[name], 6);
-      made(slide(name), { "aria-valuetext": number(now[name]) });
-    }
-    show();
-  };
-  for (const name in places) {
-    put(name, now[name]);
-    made(field(name), { change: (event) => tell(put(name, event.target.valueAsNumber)) });
-    made(slide(name), { input: (event) => tell((now[name] = places[name][event.target.value])) });
-  }
-  return [put, tell];
 }
 
 const raised = (n) => String(n).replace("-", "\u207b").replace(/\d/g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]);

@@ -11,7 +11,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.errors import SpringcheckError
 from springcheck.figures import charts
-from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Rule, Scale, numbers
+from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Scale, numbers
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
@@ -21,10 +21,7 @@ LONGEST = 2_000_000
 """Most steps of which a browser repeats the loops: about a second."""
 STAGES = {"kick", "held", "drift", "pull", "friction", "implicit-friction"}
 """Stages of a splitting that a page can carry out."""
-LOOPS = {
-    "own:euler": "own", "own:semi-implicit-euler": "own", "own:velocity-verlet": "own",
-    "ase:velocity-verlet": "ase",
-}  # fmt: skip
+LOOPS = {"own:euler", "own:semi-implicit-euler", "own:velocity-verlet"}
 """Methods of a wall spring whose operations, in their order, a page repeats to the last bit."""
 TRIED = {
     "explicit Euler": "explicit-euler",
@@ -52,20 +49,11 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
 
 
 def _live() -> Bank:
-    """Charts of the sliders; their scripts fill in the numbers of the curves."""
-    curves = [Curve(name=name, group=group, x=[], y=[]) for name, group in TRIED.items()]
-    w = np.arange(301) / 100
-    factors = [Curve(name=name, group=group, x=w, y=0 * w) for name, group in TRIED.items()]
-    orbits = Chart(
-        title="Momentum over position", x=Scale(name="q"), y=Scale(name="p"),
-        curves=[Curve(name=EXACTLY, group=EXACTLY, x=[], y=[]), *curves],
-    )  # fmt: skip
-    growth = Chart(
-        title="Factor by which one step multiplies the motion; above 1 it explodes.",
-        x=Scale(name="h \u03c9", shown=(0, 3)), y=Scale(name="factor a step", shown=(0, 3)), curves=factors,
-        rules=[Rule(axis="x", at=2, name="limit h \u03c9 = 2"), Rule(axis="y", at=1, look="one")],
-    )  # fmt: skip
-    return Bank(title="Drawn", charts=[orbits, growth])
+    """The chart of the sliders; its script fills in the numbers of the curves."""
+    names = {EXACTLY: EXACTLY, **TRIED}
+    curves = [Curve(name=name, group=group, x=[], y=[]) for name, group in names.items()]
+    orbits = Chart(title="Momentum over position", x=Scale(name="q"), y=Scale(name="p"), curves=curves)
+    return Bank(title="Drawn", charts=[orbits])
 
 
 def spring(scene: Scene) -> dict[str, float] | None:
@@ -130,13 +118,11 @@ def laws(names: Iterable[str]) -> dict[str, Any]:
 
 def drawn(piece: Trajectory, scene: Scene | None = None, *, failed: bool = False) -> dict[str, Any]:
     """The first particle of a trajectory, and a bound on the effect of rounding in a step."""
-    how, loop = piece.arithmetic, LOOPS.get(piece.label, "")
-    # ASE calculates in units of its own
-    known = scene and spring(scene) and not (loop == "ase" and scene.units == "md")
+    how = piece.arithmetic
     return {
         "label": piece.label,
         "failed": failed,
-        "loop": loop if known else "",
+        "loop": piece.label in LOOPS and scene is not None and spring(scene) is not None,
         "rounding": 256 * max(how.unit, how.quantum, 2.0**-53) * _stretch(piece, scene),
         "scheme": piece.scheme,
         "title": schemes.title(piece.scheme),

@@ -2,33 +2,6 @@
 // Steps in the order of operations of the methods named: JavaScript's numbers are IEEE doubles.  `s` is
 // {h, k, m, c} and the force f - k q - c p/m, or -k (q - at) - c p/m of a wall spring.
 
-// ASE multiplies by the step before it divides by the mass, and keeps a force for positions within 1e-15
-function aseVelocityVerlet({ h, k, m, at }) {
-  let [where, kept] = [NaN, NaN];
-  const kick = (q, p) => {
-    if (!(Math.abs(q - where) <= 1e-15)) [where, kept] = [q, -k * (q - at)];
-    return p + 0.5 * h * kept;
-  };
-  return (q, p) => {
-    const half = kick(q, p), moved = q + (h * half) / m;
-    return [moved, kick(moved, half)];
-  };
-}
-
-// The entries of a scheme's one-step matrix on (q, p), by rows.
-function matrixOf(law, s) {
-  const step = law === "exact" ? (q, p) => exactMotion({ ...s, q, p }, [s.h])[0] : stepper(law, s);
-  const [[a, c], [b, d]] = [step(1, 0), step(0, 1)];
-  return [a, b, c, d];
-}
-
-// Spectral radius of a scheme's one-step matrix at h omega = w and damping ratio c / (2 sqrt(k m)) = zeta.
-function radius(law, w, zeta) {
-  const [a, b, c, d] = matrixOf(law, { h: w, k: 1, m: 1, at: 0, c: 2 * zeta });
-  const half = (a + d) / 2, rest = half * half - (a * d - b * c);
-  return rest < 0 ? Math.sqrt(a * d - b * c) : Math.abs(half) + Math.sqrt(rest);
-}
-
 // The exact motion of the spring of `s` after each of `times`, [q, p].
 function exactMotion(s, times) {
   const g = (s.c || 0) / (2 * s.m), w2 = s.k / s.m - g * g, w = Math.sqrt(Math.abs(w2));
@@ -85,7 +58,7 @@ function stepper(law, s) {
 function departure(run, s, law) {
   const w = Math.sqrt(Math.abs(s.k) / s.m) || 1, own = { ...s, h: run.step }, at = s.at ?? (s.k && s.f / s.k);
   const motion = law === "exact" && exactMotion({ ...s, at }, run.t);
-  const step = motion ? null : run.loop === "ase" ? aseVelocityVerlet(own) : stepper(law, own);
+  const step = motion ? null : stepper(law, own);
   const found = { share: 0, frame: 0, first: null };
   let [q, p, size] = [s.q, s.p, 0];
   for (let i = 0; i < run.t.length; i++) {

@@ -26,65 +26,65 @@ function compared(run) {
 
 function selfCheck() {
   const place = by("selfcheck"), said = { wrong: [], equal: [], near: [], not: [], told: [] };
-  if (!place) return;
-  const lines = [changed()], failed = [], { runs } = DATA, frames = new Set();
-  const put = (words, labels) => labels.length && lines.push(`${words}: ${labels.join(", ")}`);
-  for (const run of DATA.linear ? runs : []) {
+  if (!place || !DATA.linear) return;
+  const { runs } = DATA, lines = [], failed = [], frames = new Set();
+  for (const run of runs) {
     const [kind, text] = compared(run);
     said[kind].push(run.label);
     if (kind === "equal") frames.add(run.t.length);
-    (kind === "told" ? failed : lines).push(text);
+    if (text) (kind === "told" ? failed : lines).push(text);
   }
-  put(`q and p the same doubles (${[...frames].join(", ")} frames)`, said.equal);
-  put("the scheme's motion to rounding, or the exact one to tolerance", said.near);
+  const { equal, near, wrong } = said;
+  const put = (words, labels) => labels.length && lines.push(`${words}: ${labels.join(", ")}`);
+  put(`q and p the same doubles (${[...frames].join(", ")} frames)`, equal);
+  put("the scheme's motion to rounding, or the exact one to tolerance", near);
   put("not computed again here", said.not);
-  const { equal, near, wrong } = said, list = lines.filter(Boolean).map((text) => html("li", {}, text));
-  const bad = ["differs", "bad", "Your browser and this file differ:"];
-  const [result, look, head] = lines[0] || wrong.length ? bad
-    : !DATA.linear ? ["none", "", place.textContent]
+  const [result, look, head] = wrong.length ? ["differs", "bad", "Your browser and this file differ:"]
     : !equal.length && !near.length ? ["none", "", "None of these methods is computed again here."]
       : ["equal", "good", `Your browser = this file: ${equal.length} of ${runs.length} methods to the last `
         + `bit, ${near.length} to rounding or tolerance.`];
   place.dataset.result = result;
-  place.replaceChildren(html("p", { class: look }, head), html("ul", {}, ...list));
+  const list = html("ul", {}, ...lines.map((text) => html("li", {}, text)));
+  place.replaceChildren(html("p", { class: look }, head), list);
   place.after(...failed.map((text) => html("p", { class: "bad" }, text)));
 }
 
-// A count or verdict that is not as it was written; "" where none is.
-function changed() {
-  const cells = "#counts, .method summary b + span, .method tbody :is(th, td:not(.why))", { words } = DATA;
-  const texts = [...document.querySelectorAll(cells), html("p", {})].map((cell) => cell.textContent.trim());
-  const i = texts.findIndex((text, j) => text !== (words[j] || ""));
-  return i < 0 ? "" : `a verdict or a count reads "${texts[i]}", and was "${words[i]}"`;
-}
-
+// Sliders and number fields for the scene's numbers; what is changed stands in the address.
 function live() {
   if (!DATA.spring) return;
   const own = { ...DATA.spring, c: 0 }, now = { ...own }, asked = new URLSearchParams(location.hash.slice(1));
-  const names = Object.keys(DATA.sliders);
+  const places = DATA.sliders, names = Object.keys(places);
+  const [slide, field] = ["slide", "show"].map((kind) => (name) => by(`${kind}-${name}`));
+  const right = (name, v) => Number.isFinite(v) && (({ h: v !== 0, m: v > 0, c: v >= 0 })[name] ?? true);
   by("live").hidden = false;
-  const bank = new Bank(by("orbits"), { ...DATA.live, charts: tried(now) });
+  const bank = new Bank(by("orbits"), { ...DATA.live, charts: [orbits(now)] });
+  const put = (name, value) => {
+    if (right(name, value)) now[name] = value;
+    const away = places[name].map((x) => Math.abs(x - now[name]));
+    slide(name).value = away.indexOf(Math.min(...away));
+  };
   const show = () => {
-    tried(now).forEach((chart, i) => bank.charts[i].show(chart));
+    for (const name of names) field(name).value = number(now[name], 6);
+    bank.charts[0].show(orbits(now));
     said(now);
     const changed = names.filter((name) => now[name] !== own[name]).map((name) => [name, now[name]]);
     if (changed.length || asked.size) history.replaceState(null, "", `#${new URLSearchParams(changed)}`);
   };
-  const right = (name, v) => ({ h: v !== 0, m: v > 0, c: v >= 0 })[name] ?? true;
-  const [put, tell] = sliding("", DATA.sliders, now, right, show);
-  for (const name of names.filter((one) => asked.has(one))) put(name, Number(asked.get(name)));
-  made(by("reset"), { click: () => tell(names.forEach((name) => put(name, own[name]))) });
-  tell();
+  for (const name of names) {
+    put(name, asked.has(name) ? Number(asked.get(name)) : now[name]);
+    made(field(name), { change: (event) => show(put(name, event.target.valueAsNumber)) });
+    made(slide(name), { input: (event) => show((now[name] = places[name][event.target.value])) });
+  }
+  made(by("reset"), { click: () => show(names.forEach((name) => put(name, own[name]))) });
+  show();
 }
 
-const dampingOf = (s) => (s.k > 0 ? (Math.sign(s.h) * s.c) / (2 * Math.sqrt(s.k * s.m)) : 0);
-
-// The orbits by these numbers, and the growth a step at any h omega.
-function tried(s) {
-  const [orbits, factors] = DATA.live.charts, steps = Math.min(DATA.steps, 1000), far = [];
+// The orbits by these numbers.
+function orbits(s) {
+  const [chart] = DATA.live.charts, steps = Math.min(DATA.steps, 1000), far = [];
   const energy = (s.p * s.p) / (2 * s.m) + (s.k * (s.q - s.at) ** 2) / 2, bound = s.k > 0 && energy > 0;
   const [a, b] = bound ? [Math.sqrt((2 * energy) / s.k), Math.sqrt(2 * energy * s.m)] : [1, 1];
-  const omega = Math.sqrt(s.k / s.m || 1), whole = Math.min(steps * Math.abs(s.h), 40 / omega);
+  const whole = Math.min(steps * Math.abs(s.h), 40 / Math.sqrt(s.k / s.m || 1));
   const motion = (curve) => {
     const step = curve.group === "exact" ? null : stepper(DATA.laws[curve.group], s);
     const times = Array.from({ length: bound ? 1001 : 0 }, (_, i) => (i / 1000) * whole);
@@ -95,36 +95,21 @@ function tried(s) {
     return { ...curve, x: path.map((state) => state[0]), y: path.map((state) => state[1]), notes };
   };
   const range = (scale, at, size) => ({ ...scale, shown: [at - 4 * size, at + 4 * size] });
-  const factor = ({ group, x }) => x.map((w) => radius(DATA.laws[group], w, dampingOf(s)));
-  const here = s.k > 0 ? [{ axis: "x", at: Math.abs(s.h) * omega, name: "here", look: "here" }] : [];
-  const curves = orbits.curves.map(motion), title = `${orbits.title}, ${steps} steps.`;
-  return [{
-    ...orbits, title: far.length ? `${title} Beyond the picture: ${far.join(", ")}.` : title, curves,
-    x: range(orbits.x, s.at, a), y: range(orbits.y, 0, b), equal: DATA.equal && a < 3 * b && b < 3 * a,
-  }, {
-    ...factors, rules: [...factors.rules, ...here],
-    curves: factors.curves.map((curve) => ({ ...curve, y: factor(curve) })),
-  }];
+  const curves = chart.curves.map(motion), title = `${chart.title}, ${steps} steps.`;
+  return {
+    ...chart, title: far.length ? `${title} Beyond the picture: ${far.join(", ")}.` : title, curves,
+    x: range(chart.x, s.at, a), y: range(chart.y, 0, b), equal: DATA.equal && a < 3 * b && b < 3 * a,
+  };
 }
 
 function said(s) {
-  const size = Math.abs(s.h) * Math.sqrt(s.k / s.m), zeta = dampingOf(s), turn = `h \u03c9 = ${number(size)}`;
-  const each = DATA.live.charts[1].curves.map(({ name, group }) => {
-    const factor = radius(DATA.laws[group], size, zeta);
-    return `${name} ${factor > 1 ? "explodes" : "decays"} by a factor ${number(factor, 4)} a step`;
-  });
+  const size = Math.abs(s.h) * Math.sqrt(s.k / s.m), turn = `h \u03c9 = ${number(size)}`;
   const free = size < 2 ? "explicit Euler spirals out, the two others stay"
     : size > 2 ? "beyond 2, all three explode" : "the limit itself";
   by("live-said").textContent = !(s.k > 0) ? "No restoring force: nothing brings the mass back."
-    : s.c ? `${turn}, damping ratio ${number(Math.abs(zeta))}: ${each.join(", ")}` : `${turn}: ${free}`;
+    : s.c ? `${turn}, damping ratio ${number(s.c / (2 * Math.sqrt(s.k * s.m)))}` : `${turn}: ${free}`;
 }
 
 selfCheck();
 live();
 for (const [name, bank] of Object.entries(DATA.banks)) new Bank(by(name), bank);
-
-// a link to a fold opens it
-addEventListener("hashchange", () => {
-  const there = by(location.hash.slice(1));
-  if (there && there.tagName === "DETAILS") there.open = true;
-});

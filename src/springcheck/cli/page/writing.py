@@ -17,7 +17,6 @@ from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
 from springcheck.figures.charts import BEGIN, EXACTLY, GUIDE, REJECTED, SEPARATRIX
-from springcheck.physics.trajectory import Verdict
 from springcheck.store import files
 from springcheck.text.wording import count, ordinal
 
@@ -55,17 +54,8 @@ def html(content: Content) -> str:
         # text of a file is shown without control characters
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
-    kept: list[str] = []
-
-    def keep(text: str) -> str:
-        """The text, which is passed to the page's script as well."""
-        kept.append(Markup(text).unescape().strip() if isinstance(text, Markup) else plain(text).strip())
-        return text
-
     around.filters |= {
-        "kept": keep,
         "short": "{:.3g}".format,
-        "fraction": fraction,
         "ordinal": ordinal,
         "count": count,
         "words": lambda text: str(text).strip(),
@@ -82,8 +72,7 @@ def html(content: Content) -> str:
         style_digest=_digest(style),
         script=Markup(script),
         script_digest=_digest(script),
-        # evaluated at the end of the page
-        data=lambda: _json(pooled(_with_looks({**content.data, "words": kept}))),
+        data=_json(pooled(_with_looks(content.data))),
     )
 
 
@@ -108,47 +97,41 @@ def write(content: Content, path: Path) -> int:
 
 
 def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data with a look for each curve: colours on white and on black, dash, dash in print, mark.
+    """The data with a look for each curve: colours on white and on black, dash, mark.
 
-    Curves of one name and scheme have one look; those of one scheme share a colour and alternate dashes.  In
-    print, where all are black, schemes differ by their dashes in order of appearance.
+    Curves of one name and scheme have one look; those of one scheme share a colour and alternate dashes.
     """
     order: dict[str, int] = {}
 
     def look(group: str, count: int) -> dict[str, Any]:
         if group in PLAIN_DASHES:
-            dash, soft = PLAIN_DASHES[group], "var(--soft)"
-            return {"colours": (soft, soft), "dash": dash, "printed": dash, "mark": SHAPES[-1]}
+            soft = "var(--soft)"
+            return {"colours": (soft, soft), "dash": PLAIN_DASHES[group], "mark": SHAPES[-1]}
         known, place = looks.look(group), order.setdefault(group, len(order)) + count
         line = looks.LINES.index(known.linestyle)
         colours = looks.FAILED_ON_SCREEN if group == REJECTED else looks.ON_SCREEN[known.color]
-        return {
-            "colours": colours, "dash": DASHES[(line + count) % len(DASHES)],
-            "printed": DASHES[place % len(DASHES)], "mark": SHAPES[place % len(SHAPES)],
-            "failed": group == REJECTED,
-        }  # fmt: skip
+        dash, mark = DASHES[(line + count) % len(DASHES)], SHAPES[place % len(SHAPES)]
+        return {"colours": colours, "dash": dash, "mark": mark}
 
     def seen(bank: Mapping[str, Any]) -> dict[str, Any]:
         counts: Counter[tuple[str, bool]] = Counter()
         found: dict[tuple[str, str], dict[str, Any]] = {}
-        for curve in (curve for chart in bank["charts"] for curve in chart["curves"]):
-            if (curve["name"], curve["group"]) not in found:
+
+        def with_look(curve: Mapping[str, Any]) -> dict[str, Any]:
+            group = curve["group"]
+            known = curve["name"], group
+            if known not in found:
                 # a theory's line and the marks on it share one look
-                kind = curve["group"], curve["line"]
-                found[curve["name"], curve["group"]] = look(curve["group"], counts[kind])
-                counts[kind] += 1
-        return {**bank, "charts": [
-            {**chart, "curves": [
-                {**curve, "look": found[curve["name"], curve["group"]]} for curve in chart["curves"]
-            ]}
-            for chart in bank["charts"]
-        ]}  # fmt: skip
+                found[known] = look(group, counts[group, curve["line"]])
+                counts[group, curve["line"]] += 1
+            return {**curve, "look": found[known]}
+
+        each = [{**chart, "curves": [with_look(x) for x in chart["curves"]]} for chart in bank["charts"]]
+        return {**bank, "charts": each}
 
     live = data.get("live")
-    return {
-        **data, "live": live and seen(live),
-        "banks": {name: seen(bank) for name, bank in data["banks"].items()},
-    }  # fmt: skip
+    banks = {name: seen(bank) for name, bank in data["banks"].items()}
+    return {**data, "live": live and seen(live), "banks": banks}
 
 
 def pooled(data: Any) -> list[Any]:
@@ -187,12 +170,3 @@ def _json(data: Any) -> Markup:
 def _digest(text: str) -> str:
     """The digest by which a Content-Security-Policy allows a text to run."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def fraction(verdict: Verdict) -> str:
-    """The value as a fraction of its bound; below 1 passes, and a bound of 0 admits 0 alone."""
-    if verdict.passed is None:
-        return "-"
-    if verdict.bound == 0:
-        return "exact" if verdict.value == 0 else "not exact"
-    return f"{verdict.value / verdict.bound:.2g}"

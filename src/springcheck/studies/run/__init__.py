@@ -14,7 +14,7 @@ STUDY = Study(
         _SCENE,
         *store_arguments(),
         argument("--all", action="store_true", help="by every method, not the default ones alone"),
-        argument("--step", type=float, metavar="H",
+        argument("--step", "--dt", type=float, metavar="H",
                  help="time step in the scene's unit (default: the scene's)"),
         argument("--temperature", metavar="T",
                  help="a heat bath: 300K, or kT where units are reduced (default: none)"),
@@ -34,6 +34,7 @@ STUDY = Study(
         ),
         argument("--seed", type=int, metavar="S", help="of random methods (default: drawn)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
+        argument("--left-out", action="store_true", help="print why each method left out did not run"),
         argument(
             "--thorough", action="store_true", help="add the experiments: order, reversal, rounding"
         ),

@@ -49,7 +49,7 @@ def _exchanged(x: float, scene: Scene, q: Floats, p: Floats) -> tuple[Floats, Fl
 
 
 def _digits(x: float, scene: Scene, q: Floats, p: Floats) -> tuple[Floats, Floats]:
-    return tuple(np.vectorize(lambda y: float(f"{y:.9g}"))(y) for y in (q, p))  # type: ignore[return-value]
+    return tuple(np.vectorize(lambda y: float(f"{y:.9g}"))(y) for y in (q, p))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,13 @@ from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from springcheck import checks
 from springcheck.checks.compare import Same
+from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies.choose import LeftOut
@@ -21,7 +23,7 @@ from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.study import StudyResult
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Text, hanging, plain
-from springcheck.text.wording import count, few
+from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.bath.heat import Heated
@@ -94,6 +96,7 @@ class Report(StudyResult):
         size = "" if scene.n == 1 else f", {scene.size}"
         out = [
             plain(f"{scene.title}: {scene.stepping}{size}", "bold"),
+            *self._summary(),
             plain(),
             *text.methods(scene, self.runs),
             *text.same_motions(self.same),
@@ -102,22 +105,30 @@ class Report(StudyResult):
             *text.failures(v for v in verdicts if v.method not in self.faults),
             *text.faults(self.faults, verdicts),
             *text.beyond(scene, self.runs),
-            *left_out(self.left_out),
         ]
-        if self.others:
-            others = few(self.others, 8)
-            out.append(plain(f"Left out {others}: not among the default methods; --all runs every one"))
         if self.judged_frames < scene.frames:
             which = "pieces at equal distances, the first and the last"
             of = f"Judged on {self.judged_frames} of {scene.frames} frames: {which}"
             out.append(plain(f"{of}; error, energy and same motion are of these"))
-        out += [plain(), *text.unjudged(verdicts, self.path), *self._summary()]
+        out += text.unjudged(verdicts, self.path)
+        failed = any(v.passed is False for v in verdicts)
+        if (left := checks.not_exercised(scene)) and not failed:
+            out += hanging("", left)
+        out += self._left(all_of_them=getattr(options, "left_out", False))
         return [*out, *text.in_full(verdicts, options)]
+
+    def _left(self, *, all_of_them: bool) -> Lines:
+        """How many methods did not run, or each of them with its reason."""
+        count_of = len(self.left_out) + len(self.others)
+        if not all_of_them:
+            said = f"{count(count_of, 'method')} left out: --left-out says why, --all runs all that can"
+            return [plain(said, "dim")] if count_of else []
+        others = [plain(f"Left out {', '.join(self.others)}: not default methods; --all runs them")]
+        return [*left_out(self.left_out), *others * bool(self.others)]
 
     def _summary(self) -> Lines:
         """Counts of the verdicts, the path of the store, and the next command."""
-        failed, left = any(v.passed is False for v in self.verdicts), checks.not_exercised(self.scene)
-        out: Lines = [*hanging("", left)] if left and not failed else []
+        failed, out = any(v.passed is False for v in self.verdicts), list[Any]()
         taken = f"; resumed from an interrupted run: {', '.join(self.resumed)}" if self.resumed else ""
         look = "bold red" if failed or self.broke else "bold yellow" if self.not_judged else "bold green"
         # standard error has the reasons
@@ -125,9 +136,13 @@ class Report(StudyResult):
         out.append(plain(f"{self.counts}{broke}{taken}", look))
         if self.path is not None:
             name = shlex.quote(str(self.path))
-            out.append(plain(f"Stored in {self.path}", look))
-            out.append(plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"))
+            out.append(plain(f"Stored in {self.path}; next: springcheck plot {name}", "dim"))
         return out
+
+    def kept_document(self) -> dict[str, Any]:
+        """What a store holds of it beyond trajectories, verdicts and comparison, for `inspect`."""
+        names = ("runs", "left_out", "same", "temperatures", "judged_frames", "others", "faults", "broke")
+        return document(**{name: getattr(self, name) for name in names})
 
     def document(self) -> dict[str, Any]:
         """The report as plain data for JSON."""
@@ -146,6 +161,29 @@ class Report(StudyResult):
             others=self.others,
             **({"temperatures": self.temperatures} if self.temperatures else {}),
         )
+
+
+def restored(
+    path: Path, scene: Scene, known: Any, verdicts: tuple[Verdict, ...], comparison: Comparison
+) -> Report:
+    """The report whose `kept_document` this is.  StoreError where a part of it is missing."""
+    from springcheck.bath.heat import Heated
+
+    def each(kind: Any, name: str) -> tuple[Any, ...]:
+        rows = [{x: nan if y is None else y for x, y in row.items()} for row in known[name]]
+        return tuple(
+            kind(**{x: tuple(y) if isinstance(y, list) else y for x, y in row.items()}) for row in rows
+        )
+
+    try:
+        return Report(
+            scene=scene, path=path, verdicts=verdicts, comparison=comparison, runs=each(MethodRun, "runs"),
+            left_out=each(LeftOut, "left_out"), same=each(Same, "same"), others=tuple(known["others"]),
+            temperatures=each(Heated, "temperatures"), judged_frames=known["judged_frames"],
+            faults=dict(known["faults"]), broke=dict(known["broke"]),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise StoreError(f"{path}: its report lacks {error}") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,6 +238,8 @@ class Stored(StudyResult):
     verdicts: tuple[Verdict, ...]
     comparison: Comparison | None
     status: int = 0
+    report: Report | None = None
+    """The report of the run; None in a store of an earlier version."""
 
     @cached_property
     def drawable(self) -> Drawable:
@@ -214,8 +254,8 @@ class Stored(StudyResult):
         return self.drawable.notes
 
     def lines(self, options: Namespace | None = None) -> Lines:
-        out: Lines = []
-        if self.verdicts:
+        out: Lines = [] if self.report is None else self.report.lines(options)
+        if self.verdicts and self.report is None:
             out += [*text.fractions(self.verdicts), *text.failures(self.verdicts)]
             out += [*text.unjudged(self.verdicts, self.path), *text.in_full(self.verdicts, options)]
         if self.comparison is not None:

@@ -17,7 +17,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.text import of_energy
-from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
+from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
 from springcheck.text.wording import number, rounded_down, seconds
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ def fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
     """Value over bound of each check for each method."""
     return [
         plain(),
-        plain(f"{question}Largest value of each check, as a fraction of its bound:"),
-        plain("below 1 passes; ! marks what does not", "dim"),
+        plain(f"{question}Largest value of each check over its bound:"),
+        plain("Values below 1 pass; ! marks a failure.", "dim"),
         *matrices(verdicts),
         *sights(verdicts),
     ]
@@ -191,19 +191,18 @@ def _cell(verdict: Verdict | None) -> Text:
 
 def sights(verdicts: Sequence[Verdict]) -> Lines:
     """Smallest detectable errors of a stiffness and of a temperature, in the best and the worst method."""
-    said = []
+    out: Lines = []
     for quantity in ("stiffness", "temperature"):
         known: dict[str, float] = {}
         for v in verdicts:
             if v.passed and (x := getattr(v.sees, quantity)) is not None:
                 known[v.method] = min(x, known.get(v.method, x))
         if known:
-            keen, dull = (how(known, key=known.__getitem__) for how in (min, max))
-            said.append(f"A {quantity} off by {known[keen]:.1e} would be seen in {keen}")
-            if dull != keen:
-                said[-1] += ","
-                said.append(f"one off by {known[dull]:.1e} in {dull} and in all between")
-    return [plain(line, "dim") for line in said]
+            best, worst = (how(known, key=known.__getitem__) for how in (min, max))
+            said = f"Smallest detectable {quantity} error: {known[best]:.1e} ({best})"
+            said += f" to {known[worst]:.1e} ({worst})" if worst != best else ""
+            out += hanging("", said)
+    return out
 
 
 def failures(verdicts: Iterable[Verdict]) -> Lines:

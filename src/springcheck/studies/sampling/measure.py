@@ -71,12 +71,10 @@ def temperature(squares: Floats) -> tuple[float, float]:
     return float(np.mean(squares)), max(alone, float(np.std(blocks, ddof=1)) / np.sqrt(BLOCKS))
 
 
-def law_at(scheme: str, turn: float, friction: float) -> Law:
-    """The law of a scheme on one of these springs, by h omega and gamma/omega."""
-    return Law(
-        scheme=THERMOSTATS[scheme], h=turn / OMEGA, m=np.array([MASS]), k=np.array([STIFFNESS]),
-        rate=friction * OMEGA, thermal=KT,
-    )  # fmt: skip
+def law_at(scheme: str, turns: Floats, frictions: Floats | float) -> Law:
+    """The law of a scheme at these h omega and frictions over omega (n,)."""
+    one = np.ones(len(turns))
+    return Law(scheme=THERMOSTATS[scheme], h=1.0, m=one, k=turns**2, rate=frictions * turns, thermal=1.0)
 
 
 def measured(label: Label) -> Sampled:
@@ -85,7 +83,7 @@ def measured(label: Label) -> Sampled:
     scheme = THERMOSTATS[method.scheme]
     rows, run = [], None
     for turn in SAMPLED_TURNS:
-        law = None if scheme.rescales else law_at(scheme.name, turn, RATE)
+        law = None if scheme.rescales else law_at(scheme.name, np.array([turn]), RATE)
         exact = (float(law.configurational[0]), float(law.kinetic[0])) if law else (nan, nan)
         if law and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
@@ -158,16 +156,8 @@ def last_stable(radius: Callable[[Floats], Floats], n: int, to: float) -> Floats
 
 def limits(scheme: str, frictions: Floats) -> Floats:
     """The largest h omega at which the law of a scheme is stable, at frictions over omega (n,)."""
-
-    def radius(turns: Floats) -> Floats:
-        law = Law(
-            scheme=THERMOSTATS[scheme], h=1.0, m=np.ones(len(turns)), k=turns**2, rate=frictions * turns,
-            thermal=1.0,
-        )  # fmt: skip
-        with np.errstate(all="ignore"):
-            return law.growth
-
-    return last_stable(radius, len(frictions), 1e-9)
+    with np.errstate(all="ignore"):
+        return last_stable(lambda turns: law_at(scheme, turns, frictions).growth, len(frictions), 1e-9)
 
 
 def _limit_of_engine(label: Label, friction: float) -> float:
@@ -184,7 +174,7 @@ def _limit_of_engine(label: Label, friction: float) -> float:
 def curve(scheme: str, turns: Floats, of: str) -> Floats:
     """The law's temperature at these h omega, NaN where the step is unstable."""
     with np.errstate(all="ignore"):
-        found = np.array([float(getattr(law_at(scheme, x, RATE), of)[0]) for x in turns])
+        found = np.asarray(getattr(law_at(scheme, turns, RATE), of))
     return np.where(np.isfinite(found), found, nan)
 
 

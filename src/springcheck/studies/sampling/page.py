@@ -67,16 +67,13 @@ def banks(study: Sampling) -> list[Bank]:
 def heading(methods: Sequence[Sampled]) -> str:
     """How many schemes sample right configurations at the step nearest to h omega = 1, and the worst."""
     i = int(np.argmin(np.abs(methods[0].turn - 1)))
-    ends = ((x.scheme, float(x.configurational_law[i]), float(x.configurational[i])) for x in methods)
-    off = {title(name): (measured if np.isnan(law) else law) - 1 for name, law, measured in ends}
-    right = sum(abs(x) <= IS_RIGHT for x in off.values())
-    name, at = max(off, key=lambda name: abs(off[name])), f"h {W_SIGN} = {methods[0].turn[i]:g}"
-    said = f"At {at} the configurational temperature is right to {share(IS_RIGHT)} in {right} of {len(off)}"
-    schemes = "scheme" if len(off) == 1 else "schemes"
-    if right == len(off):
-        return f"{said} {schemes}"
-    worst = "hot" if off[name] > 0 else "cold"
-    return f"{said} {schemes}; {name} is {share(abs(off[name]))} too {worst}"
+    pairs = ((x.scheme, float(x.configurational_law[i]), float(x.configurational[i])) for x in methods)
+    off = {title(name): (measured if np.isnan(law) else law) - 1 for name, law, measured in pairs}
+    right, name = sum(abs(x) <= IS_RIGHT for x in off.values()), max(off, key=lambda x: abs(off[x]))
+    said = f"At h {W_SIGN} = {methods[0].turn[i]:g} the configurational temperature is right to "
+    said += f"{share(IS_RIGHT)} in {right} of {len(off)} scheme{'s' * (len(off) > 1)}"
+    too = "hot" if off[name] > 0 else "cold"
+    return said if right == len(off) else f"{said}; {name} is {share(abs(off[name]))} too {too}"
 
 
 def _lines(schemes: Sequence[str], x: Floats, laws: dict[str, Floats]) -> list[Curve]:
