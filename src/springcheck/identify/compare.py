@@ -134,7 +134,7 @@ def match(row: Row, found: Map, free: Freedom, strides: Iterable[int], *, far: b
     good &= far | (chi2 <= (chdtri(freedom, CHANCE) if freedom else 1e-4))
     if row.damped and not free.growing:
         good &= x[1] > 0
-    if row.formula is None and len(row.under) == 1:
+    if row.damped and row.formula is None and len(row.under) == 1:
         # polynomials of many stages take any value far beyond their limit
         good &= np.abs(x[0]) <= BEYOND
     best: dict[int, tuple[Any, int]] = {}

@@ -79,23 +79,26 @@ def explain(seen: Seen, again: Callable[[Record, Seen], Identification] | None) 
                 continue
             if not clean and (now <= max(level / FALLS**2, 4) or (now < level / FALLS and now < 40)):
                 return [said]
-    if found := _shaped(record, m, j, clean=clean):
-        return [found]
+    shape = None if clean else limited(record, j) or (None if record.mixed else sine(record, j))
+    if shape:
+        return [shape]
     if clean and seen.marked:
         return [_marked(seen)]
     if clean:
+        if found := _solved(record, m):
+            return [found]
         if record.fine and (solver := of_a_solver(m, m.size_left, record.jitter, clean=True)):
             return [solver]
         kind = kind_of_map(m)
         none = "One linear map explains the states, but it is none of the known schemes'"
         return [Explanation(kind or none, COMPARE)]
-    return [bad_frames(record, m, j) or law(seen.maps, m, record.jitter)]
+    found = bad_frames(record, m, j) or law(seen.maps, m, record.jitter)
+    vague = not found.shown or found.cause.startswith("Noise")
+    return [(_solved(record, m) if vague else None) or found]
 
 
-def _shaped(record: Record, m: Map, j: int, *, clean: bool) -> Explanation | None:
-    """A limit, a force of a sine, or an implicit step that is solved to a tolerance."""
-    if not clean and (found := limited(record, j) or (not record.mixed and sine(record, j)) or None):
-        return found
+def _solved(record: Record, m: Map) -> Explanation | None:
+    """An implicit step that is solved to a tolerance."""
     return solved(m, record.jitter) if record.fine and m.size_left < SOLVED else None
 
 
