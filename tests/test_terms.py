@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-import springcheck
 import textbook as seeded
 from springcheck import checks, driver, store
 from springcheck.checks import laws
@@ -211,24 +209,6 @@ def test_a_scene_with_an_unknown_term_is_refused_in_one_line() -> None:
     with pytest.raises(SceneError, match="gauss-dent") as caught:
         scenes.parse(SCENE, name="dent")
     assert "\n" not in str(caught.value)
-
-
-def test_no_module_guesses_the_fields_of_a_term() -> None:
-    """Outside of physics/ nobody asks with getattr, hasattr or dataclasses.fields what a term has."""
-    home = Path(springcheck.__file__).parent
-    besides = (home / "physics", home / "engines")
-    others = [path for path in home.rglob("*.py") if not any(map(path.is_relative_to, besides))]
-    assert len(others) > 100
-    for path in others:
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
-                asked = ast.unparse(node.args[0])
-                is_guess = node.func.id in ("getattr", "hasattr", "fields") and asked in (
-                    "term",
-                    "t",
-                    "terms[0]",
-                )
-                assert not is_guess, f"{path.name}, line {node.lineno}: {ast.unparse(node)}"
 
 
 def test_a_term_of_other_numbers_is_another_object() -> None:

@@ -308,6 +308,7 @@ COMMANDS = (
         argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         JSON,
+        ENGINE,
     )),
     Command("plot", "draw what is in a store, or in a file of any program, as PNG and SVG", _plot, (
         _FILE,
@@ -318,11 +319,13 @@ COMMANDS = (
         _STEPS,
         _GROUP,
         QUIET,
+        ENGINE,
     )),
     Command("report", "a store as one HTML page that checks itself in a browser", _report, (
         _FILE,
         argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html"),
         QUIET,
+        ENGINE,
     )),
     Command("show", "a shipped scene as a file to start from", _show, (
         argument("scene", metavar="SCENE"),
@@ -366,8 +369,9 @@ COMMANDS = (
         argument("--partial", action="store_true", help="let a file pass that covers a part of the scene"),
         argument("--verdicts", action="store_true", help="print every check with its reason"),
         JSON,
+        ENGINE,
     )),
-    Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),
+    Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE, ENGINE)),
     Command("export", "one trajectory as a file of its own, for other tools", _export, (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
