@@ -82,7 +82,7 @@ def lines(name: str) -> Iterator[str]:
     parts += [_fault(fault) for fault in FAULTS if fault.name == name]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     if term := terms.known().get(name):
-        parts.append(iter([_line(f"{name}, a term: {described(term)}")]))
+        parts.append(_term(term))
     if said := word(name):
         parts.append(iter([f"{said[0]}: {said[1]}"]))
     if not parts:
@@ -129,6 +129,17 @@ def meaning_lines(meaning: Meaning) -> Iterator[str]:
     yield _line(f"Does not see: {meaning.misses}")
     if meaning.source:
         yield _line(f"Source: {meaning.source}")
+
+
+def _term(term: Any) -> Iterator[str]:
+    """A term: its law, and the fields of its table."""
+    yield _line(f"{term.key}, a term: {described(term)}")
+    yield f"  energy   {term.formula}"
+    for column in (x for x in term.columns if x.field != "number"):
+        default = "" if column.default is None else f", {column.default:g} by default"
+        sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
+        inverse = f", or its inverse {column.field}" if column.inverse else ""
+        yield f"  {column.name}: {sign}{default}{inverse}"
 
 
 def _method(name: str) -> Iterator[str]:

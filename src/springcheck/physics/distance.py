@@ -202,7 +202,8 @@ class OnDistances(Distances):
         twin = dataclass(frozen=True, kw_only=True, eq=False)(type(name, (ToPoints,), own))
         cls.to_points = twin
         # found there when a term goes to another process
-        setattr(sys.modules[cls.__module__], name, twin)
+        if module := sys.modules.get(cls.__module__):
+            setattr(module, name, twin)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -21,14 +21,15 @@ from springcheck.physics.distance import (
     OnDistances,
     RadialMorse,
     RadialSpring,
+    ToPoints,
 )
 from springcheck.physics.driven import Drive
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 
 __all__ = [
     "Column", "Cosine", "Damping", "Distances", "Drive", "Kepler", "LennardJones", "Morse", "OnDistances",
-    "OnPairs", "OnParticles", "Quartic", "RadialMorse", "RadialSpring", "Spring", "Term", "VanDerPol",
-    "WallSpring", "Weight", "known", "register",
+    "OnPairs", "OnParticles", "Quartic", "RadialMorse", "RadialSpring", "Spring", "Term", "ToPoints",
+    "VanDerPol", "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
