@@ -63,9 +63,7 @@ def test_a_finding_says_formula_reach_and_limits(name: str) -> None:
 
 
 def test_findings_of_identify_have_their_words() -> None:
-    assert {"old-force", "halves-swapped", "exact-behind", "velocity-offset", "not-told-apart"} <= set(
-        MEANINGS
-    )
+    assert {"old-force", "halves-swapped", "velocity-offset", "not-told-apart"} <= set(MEANINGS)
     # a word of two meanings has both
     said = " ".join(" ".join(explain.lines("determinant")).split())
     assert "a check of the map" in said
