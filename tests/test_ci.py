@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 import pytest
 
 from springcheck.cli import ci, main
-from springcheck.store import files
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "ci-examples"
@@ -233,10 +232,10 @@ def test_a_full_disk_leaves_a_report_as_it_was(
     if before:
         Path("j.xml").write_bytes(before)
 
-    def full(path: Path) -> None:
+    def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(files, "sync", full)
+    monkeypatch.setattr(os, "fsync", full)
     assert main(["identify", "none.csv", "--junit", "j.xml"]) == 2
     assert "j.xml: the disk is full" in capsys.readouterr().err
     assert {x.name: x.read_bytes() for x in Path().iterdir()} == ({"j.xml": before} if before else {})

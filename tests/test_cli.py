@@ -165,7 +165,8 @@ def test_check_and_export(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "spring.h5", "own:euler", "euler.h5md"]) == 0
     assert Path("euler.h5md").stat().st_size > 1000
     damaged = bytearray(Path("spring.h5").read_bytes())
-    damaged[len(damaged) // 2] ^= 1
+    states = springcheck.read("spring.h5")["own:euler"].q.tobytes()
+    damaged[damaged.index(states) + 100] ^= 1
     Path("damaged.h5").write_bytes(damaged)
     capsys.readouterr()
     assert main(["check", "damaged.h5"]) == 1
@@ -226,9 +227,9 @@ def test_a_store_in_a_folder_that_is_read_only_is_run_again(
     made: list[str | None] = []
     folder = tempfile.mkdtemp
 
-    def noted(dir: Path | None = None, prefix: str | None = None) -> str:
+    def noted(suffix: str | None, prefix: str | None, dir: Path | None) -> str:
         made.append(dir and str(dir))
-        return folder(prefix=prefix)
+        return folder(suffix, prefix)
 
     monkeypatch.setattr(tempfile, "mkdtemp", noted)
     assert main(["run", "--from", "spring.h5"]) == 0

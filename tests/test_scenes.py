@@ -24,7 +24,6 @@ from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats
-from springcheck.physics.exact import normal
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
@@ -240,24 +239,6 @@ def test_groups_of_different_laws_move_as_each_does_alone() -> None:
             assert np.all(np.abs(together[row] - np.concatenate(each, axis=1)[row]) <= 2 * bound)
 
 
-def test_the_modes_of_a_uniform_chain_are_sines() -> None:
-    scene = shortened("long-chain")
-    waves = scene.system.modes
-    assert waves.waves
-    w2, vectors = normal._eigen(np.asarray(scene.system.hessian(scene.q) / scene.m[0], np.longdouble))
-    assert np.max(np.abs(w2 - waves.w2)) < 16 * scene.n * exact.EPS * np.max(w2)
-    r = np.arange(1, scene.n + 1)
-    shapes = normal._one_turn(scene.n)[np.outer(r, r) % (2 * (scene.n + 1))]
-    turned = np.abs(vectors.T @ shapes)
-    # the slow modes lie close together, and what rounding mixes of them grows with the inverse distance
-    assert np.max(np.abs(turned - np.eye(scene.n))) < 1e-14
-    y = np.random.default_rng(3).normal(size=(4, scene.n)).astype(np.longdouble)
-    there = waves.into(y, y)
-    back = waves.out_of(*there)
-    assert max(np.max(np.abs(x - y)) for x in back) < 16 * exact.EPS * np.sqrt(scene.n)
-    assert np.max(np.abs(there[0] - (y * waves.root_m) @ shapes)) < 64 * scene.n * exact.EPS
-
-
 @pytest.mark.parametrize("name", [name for name in scenes.names() if scenes.load_scene(name).bath is None])
 def test_own_methods_compiled_and_interpreted_agree_to_the_last_bit(name: str) -> None:
     pytest.importorskip("numba")
@@ -317,24 +298,6 @@ def test_a_molecule_moves_alike_in_nanometres_and_in_angstroms(name: str, need: 
     allowed = 2 * case.roundings * rounding * scene.steps * (1 + scene.steps * hw)
     assert np.max(scene.system.norm(one.q - other.q, one.p - other.p)) <= allowed
     assert allowed < 1e-6
-
-
-@pytest.mark.parametrize("label", ["openmm:verlet", "ase:velocity-verlet"])
-def test_the_centre_of_mass_goes_straight_on(label: str, need: Need) -> None:
-    need(label)
-    scene = scenes.load_scene("carbon-monoxide")
-    run = driver.run(scene, label)
-    centre = run.q @ scene.m / np.sum(scene.m)
-    wanted = centre[0] + run.t * np.sum(scene.p) / np.sum(scene.m)
-    assert np.max(np.abs(centre - wanted)) < scene.steps * 2.0**-52 * np.max(np.abs(run.q))
-
-
-def test_the_stiffness_of_carbon_monoxide_is_that_of_its_wave_number() -> None:
-    scene = scenes.load_scene("carbon-monoxide")
-    term = scene.terms[0]
-    assert isinstance(term, Spring)
-    mass = scene.m[0] * scene.m[1] / np.sum(scene.m)
-    assert term.k[0] == pytest.approx(mass * (2 * np.pi * LIGHT * 2169.81358) ** 2, rel=1e-9)
 
 
 def test_the_bond_of_hydrogen_chloride_has_its_spectroscopic_constants() -> None:
@@ -423,12 +386,6 @@ def test_a_mistake_in_a_chain_is_answered(old: str, new: str, words: tuple[str, 
         scenes.parse(text.replace(old, new), name="bad", where="bad.toml")
     for word in ("bad.toml", *words):
         assert word in str(caught.value), str(caught.value)
-
-
-def test_a_circuit_keeps_its_units() -> None:
-    text = (scenes.folder() / "lc-circuit.toml").read_text(encoding="utf-8")
-    with pytest.raises(SceneError, match="units = 'md'"):
-        scenes.parse(text.replace("[[inductor]]", 'units = "md"\n[[inductor]]', 1), name="x")
 
 
 def test_a_chain_of_any_length_stands_between_walls() -> None:
