@@ -138,8 +138,7 @@ def _term(term: Any) -> Iterator[str]:
     for column in (x for x in term.columns if x.field != "number"):
         default = "" if column.default is None else f", {column.default:g} by default"
         sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
-        inverse = f", or its inverse {column.field}" if column.inverse else ""
-        yield f"  {column.name}: {sign}{default}{inverse}"
+        yield f"  {column.name}: {sign}{default}"
 
 
 def _method(name: str) -> Iterator[str]:
