@@ -79,7 +79,7 @@ def draw_foreign(
     trajectory: str | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Draw the states in any program's file, as `draw`; `particle` is the index of a coordinate."""
-    from springcheck.cli.file import states_in
+    from springcheck.cli.taken import states_in
     from springcheck.figures import looks, render
     from springcheck.figures.charts import Bank, Chart, Curve, Scale
     from springcheck.figures.motion import periods

@@ -14,7 +14,7 @@ from springcheck.identify.catalogue import FAULTS, HELD, OLD_FORCE, aliases, cap
 from springcheck.identify.compare import Joint
 from springcheck.identify.result import UNTOLD, Candidate, Explanation, Identification, nothing
 from springcheck.identify.rows import same
-from springcheck.identify.search import Found, Round, Seen
+from springcheck.identify.search import FEW, Found, Round, Seen
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, kind_of_map
 from springcheck.schemes.elsewhere import ELSEWHERE
 
@@ -223,7 +223,10 @@ def _named(seen: Seen, found: Found) -> Identification:
     names, strides = list(dict.fromkeys(x.scheme for x in candidates)), {x.stride for x in candidates}
     stride = first.stride if len(strides) == 1 else None
     law, steps = _law(joints), _steps(stride) if len(strides) == 1 else ""
-    unsure = first.row.scheme in ELSEWHERE and first.stride > 1
+    # many small steps of one scheme come near those of another
+    unsure = first.stride > (1 if first.row.scheme in ELSEWHERE else FEW[-1] if seen.stride is None else 999)
+    # and so they do where the step may be rounded to single precision beside its times
+    unsure = unsure or (first.parts[0].log_scale != 0 and not (seen.record.vague or seen.record.momenta))
     hedge = "" if fine and not unsure else OR_UNKNOWN
     kind, comma, stored = precision.partition(", stored")
     arithmetic = f"rounding to {precision.replace('text, ', '')}"
