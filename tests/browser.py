@@ -101,17 +101,6 @@ class Browser:
         """A mouse event at a point of the window [pixels]."""
         self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Press, move and release the left button."""
-        self.mouse("mousePressed", *start, button="left", clickCount=1)
-        self.mouse("mouseMoved", *end, button="left", buttons=1)
-        self.mouse("mouseReleased", *end, button="left", clickCount=1)
-
-    def key(self, name: str, text: str = "") -> None:
-        """Press a key and let it go."""
-        self.send("Input.dispatchKeyEvent", type="keyDown", key=name, text=text)
-        self.send("Input.dispatchKeyEvent", type="keyUp", key=name)
-
     def picture(self, path: Path) -> None:
         """The whole page as PNG, to be looked at."""
         found = self.send("Page.captureScreenshot", captureBeyondViewport=True)

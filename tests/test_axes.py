@@ -218,26 +218,6 @@ def test_columns_of_a_store_find_their_axes() -> None:
         assert np.count_nonzero(out) == q.size
 
 
-def test_a_report_says_what_a_pass_does_not_cover(tmp_path: Path) -> None:
-    for scene, said in (
-        (orbit(), "here: friction"),
-        (spring(), "here: axes y and z"),
-    ):
-        report = springcheck.run(scene, "own:euler", path=tmp_path / f"{scene.name}.h5")
-        assert said in str(report.lines())
-
-
-def test_the_path_of_a_particle_is_drawn_in_each_plane(tmp_path: Path) -> None:
-    from springcheck.figures.views import paths
-
-    assert [view.x_name[-1] + view.y_name[-1] for view in paths(orbit())] == ["xy", "yz", "xz"]
-    assert paths(spring()) == []
-    views = paths(scenefile.load_scene("lissajous"))
-    q = np.arange(6.0).reshape(3, 2)
-    x, y = views[0].pick(q, q)
-    assert (x.tolist(), y.tolist()) == ([0, 2, 4], [1, 3, 5])
-
-
 def test_momentum_is_judged_along_each_axis_by_itself() -> None:
     """What leaks into one axis and out of another was no change of the sum over all."""
     between = Spring(a=[0, 1], b=[2, 3], k=[2.9, 2.9], rest=[0.0, 0.0])

@@ -56,7 +56,7 @@ SCENES = {
     "no time at all": (("[time]\nstep = 0.1\nsteps = 200\ntolerance = 1e-12", ""), ("time",)),
     "a tolerance of zero": (("tolerance = 1e-12", "tolerance = 0.0"), ("time.tolerance", "0.0")),
     "1e12 frames": (("steps = 200", "steps = 1_000_000_000_000"), ("GB", "free")),
-    "a record that misses the end": (("steps = 200", "steps = 200\nevery = 7"), ("every", "7", "200")),
+    "a record that misses the end": (("tolerance = 1e-12", "[record]\nevery = 7"), ("every", "7", "200")),
     "an unknown unit": (('units = "reduced"', 'units = "parsec"'), ("units", "parsec", "reduced, md, si")),
     "a unit that is no word": (('units = "reduced"', "units = 3"), ("units = 3", "reduced, md, si")),
     "an unknown quantity": (
@@ -68,7 +68,7 @@ SCENES = {
         ("record.quantities", "a list in brackets"),
     ),
     "more steps than numbers": (
-        ("steps = 200", f"steps = {10**23}\nevery = {10**23}"),
+        ("steps = 200\ntolerance = 1e-12", f"steps = {10**23}\n[record]\nevery = {10**23}"),
         ("time.steps", "2**53"),
     ),
     "broken TOML": (("[time]", "[time"), ("TOML", "line")),

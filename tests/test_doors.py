@@ -95,18 +95,6 @@ def test_what_is_brought_runs_beside_the_default_methods_and_not_beside_all(
     assert "own:rk4" in map(str, choose(load_scene("spring"), ["*"])[0])
 
 
-def test_a_method_that_is_named_is_not_joined_by_others_of_the_engine_that_brings_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "mine.py").write_text(VERLET + "\nsecond = leapfrog\n")
-    brought = ["--stepper", "mine.py:leapfrog", "--stepper", "mine.py:second"]
-    for named, all_run in (("stepper:second", [1]), ("own:rk4", [0, 1]), ("stepper:*", [0, 1])):
-        main(["run", "spring", "--steps", "2", "--json", "--force", *brought, "--method", named])
-        found = [one["method"] for one in json.loads(capsys.readouterr().out)["runs"]]
-        expected = [["stepper:leapfrog", "stepper:second"][i] for i in all_run]
-        assert found == [named] * (named == "own:rk4") + expected
-
-
 @pytest.mark.usefixtures("sketched")
 def test_a_wrong_function_runs_among_the_engines_without_a_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -186,14 +174,6 @@ def test_workers_run_what_a_call_brings(tmp_path: Path) -> None:
         assert np.array_equal(alone[number].p, both[number].p)
     with pytest.raises(MethodError, match=r"unknown engine 'pefrl'|which is not given here"):
         list(team.Processes(2).carried_out(parts))
-
-
-def test_a_cluster_is_told_apart_from_the_processes_of_a_call(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "mine.py").write_text(VERLET)
-    assert main(["stability", "spring", "--stepper", "mine.py:leapfrog", "--cluster", "tcp://nowhere:1"]) == 2
-    assert "--cluster: what a call brings is not on the machines of a cluster" in capsys.readouterr().err
 
 
 BAD_FUNCTIONS = [
@@ -311,13 +291,6 @@ def test_a_program_in_c_is_judged_by_the_scheme_that_it_states(
     judged = {v["check"] for v in found["verdicts"] if v["method"] == "command:c" and v["passed"]}
     assert {"start", "times", "step-defect", "closed-form", "frequency"} <= judged
     assert run(capsys, *command, "--scheme", "rk4", "-o", "x.h5")["status"] == 1
-
-
-def test_a_program_in_awk_is_judged_too(capsys: pytest.CaptureFixture[str]) -> None:
-    if shutil.which("awk") is None:
-        pytest.skip("no awk")
-    command = f"awk=sh {EXAMPLES / 'euler.sh'} {{scene}} {{out}}"
-    assert run(capsys, "--command", command, "--scheme", "semi-implicit-euler")["status"] == 0
 
 
 def test_mended_code_runs_again_and_the_others_are_shown_all_the_same(

@@ -158,7 +158,7 @@ stiffness = 5.1
 
 
 DRIVE = "[[drive]]\nparticle = 1\namplitude = 7.0\nfrequency = 1.1"
-HILL = "[[cosine]]\nparticle = 1\ndepth = -7.0\nlength = 0.7\nat = 1.05"
+HILL = "[[cosine]]\nparticle = 1\ndepth = -7.0\nwave = 1.4285714285714286\nat = 1.05"
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 
 import references
 import springcheck
-from springcheck.physics import builders, exact, graph
+from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring, Weight
@@ -311,6 +311,6 @@ def test_the_stated_error_of_a_long_chain_is_some_roundings_of_its_length(n: int
     q = np.zeros(n, np.longdouble)
     for mode, size in ((1, 1.0), (7, 0.3)):
         w = 2 * np.sqrt(2.9 / 1.3) * np.sin(np.pi * mode / (2 * (n + 1)))
-        q += size * np.cos(w * t) * graph.standing(n, [(mode, 1.0)])
+        q += size * np.cos(w * t) * builders.standing(n, [(mode, 1.0)])
     found, _ = exact.true_motion(scene, np.array([scene.steps]), scene.step)
     assert np.max(np.abs(found[0] - q)) < 1e-13

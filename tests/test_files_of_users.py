@@ -161,7 +161,9 @@ def test_a_command_whose_saved_compiled_code_is_damaged_compiles_anew(
     numba = pytest.importorskip("numba")
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
     text = (folder() / "spring.toml").read_text()
-    Path("long.toml").write_text(text.replace("steps = 200", "steps = 1000000\nevery = 10000"))
+    Path("long.toml").write_text(
+        text.replace("steps = 200", "steps = 1000000") + "\n[record]\nevery = 10000\n"
+    )
     digests = []
     for name in ("first.h5", "again.h5"):
         compiled._COMPILED.clear()

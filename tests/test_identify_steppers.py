@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 import springcheck
@@ -19,7 +18,7 @@ from springcheck import checks, doors, driver
 from springcheck.errors import MethodError
 from springcheck.identify import identify_stepper
 from springcheck.identify.files import shown
-from springcheck.identify.taken import seen_to_take
+from springcheck.identify.steps import seen_to_take
 from springcheck.schemes import UNKNOWN
 
 Force = Callable[..., Any]
@@ -113,16 +112,6 @@ def test_none_of_them_fails_on_an_anharmonic_scene(stepper: Force) -> None:
     assert [f"{v.check}: {v.why}" for v in verdicts if v.passed is False] == []
     step = {v.check: v.passed for v in verdicts}["step-defect"]
     assert step is (True if stepper in (heun, trapezoidal) else None)
-
-
-def test_parameters_that_change_from_spring_to_spring_are_none() -> None:
-    found = identify_stepper(wrong_nystroem)
-    assert not found.fits
-    assert found.statement.startswith("A one-step method that is not known here: on three springs it would")
-    assert not any("Newmark's method with" in x.cause for x in found.explanations[1:])
-    known = identify_stepper(newmark).statement
-    assert "Newmark's method with beta = 0.166667, gamma = 0.5" in known
-    assert "three springs" not in known
 
 
 def test_a_force_kept_from_the_run_before_is_no_number_written_into_the_stepper() -> None:
@@ -242,18 +231,6 @@ def test_a_stepper_that_takes_numbers_alone_was_tried_with_one_particle() -> Non
     assert (found.scheme, found.fits) == ("semi-implicit-euler", True)
     assert any(note.startswith("tried with one particle alone: arrays of two end in") for note in found.notes)
     assert not any("tried with one" in note for note in identify_stepper(heun).notes)
-
-
-def test_other_springs_do_not_repeat_a_remark() -> None:
-    """ "A friction below ... would not show" stood there three times, each with another number."""
-
-    def single(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
-        p = p + h / 2 * force(q)
-        q = q + h * p / m
-        return np.float32(q).astype(float), np.float32(p + h / 2 * force(q)).astype(float)
-
-    notes = identify_stepper(single).notes
-    assert sum("would not show" in note for note in notes) == 1
 
 
 @pytest.mark.parametrize(

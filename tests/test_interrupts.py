@@ -25,6 +25,7 @@ import springcheck
 from springcheck import checks, cli, driver, engines, interrupts, store
 from springcheck.engines.own import simulation
 from springcheck.physics import scenefile
+from springcheck.studies.precision import bare
 from springcheck.studies.run import measure as session
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
@@ -107,7 +108,7 @@ def test_an_engine_is_asked_for_few_steps_at_a_time(monkeypatch: pytest.MonkeyPa
     assert max(calls) <= driver.PIECE
     calls.clear()
     label = engines.parse("own:euler")
-    driver.bare(scene, label)
+    bare.measure(scene, label)
     assert sum(calls) == 10**9
     assert calls[0] <= driver.PIECE
 

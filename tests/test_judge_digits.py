@@ -16,7 +16,7 @@ import springcheck
 from springcheck import checks, driver, engines, schemes
 from springcheck.cli import file
 from springcheck.errors import StoreError
-from springcheck.identify.taken import has_a_start, springs_of
+from springcheck.identify.steps import has_a_start, springs_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring

@@ -20,7 +20,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
 from springcheck.schemes import SCHEMES, matrix
-from springcheck.studies.precision import METRICS, STUDY, accuracy, fits, longtime, result, sweeping
+from springcheck.studies.precision import METRICS, STUDY, accuracy, bare, fits, longtime, result, sweeping
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import POINTS, Point, Sweep
@@ -330,16 +330,16 @@ def test_a_run_that_diverges_and_a_method_that_cannot_run_are_points() -> None:
 
 
 def test_a_dear_method_is_cut_off_and_leaves_its_seconds_to_others() -> None:
-    scene, bare = scenes.load_scene("spring-uneven"), driver.bare
+    scene, measured = scenes.load_scene("spring-uneven"), bare.measure
     slow, quick = engines.parse("ase:velocity-verlet"), engines.parse("own:velocity-verlet")
 
-    def at_its_speed(scene: Scene, label: Label, **how: Any) -> driver.Bare:
-        found = bare(scene, label, **how)
+    def at_its_speed(scene: Scene, label: Label, **how: Any) -> bare.Bare:
+        found = measured(scene, label, **how)
         runs = 100.0 if label == slow and scene.steps > 1 else found.timing.run
         return found._replace(timing=replace(found.timing, run=runs))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(driver, "bare", at_its_speed)
+        patch.setattr(bare, "measure", at_its_speed)
         found = precision.record(scene, [slow, quick], budget=0.5)
     first, second = found.sweeps
     assert [x.outcome for x in first.points] == ["cut off"]

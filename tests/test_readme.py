@@ -31,28 +31,37 @@ def blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.S)
 
 
-def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> None:
-    (term,) = (block for block in blocks("python", DATA) if "class Sextic" in block)
-    (tmp_path / "sextic.py").write_text(term)
-    (scene,) = (block for block in blocks("toml", DATA) if "sextic" in block)
-    (tmp_path / "well.toml").write_text(scene)
-    done = subprocess.run(
-        [sys.executable, "-m", "springcheck", "run", "well.toml", "--engine", "sextic.py",
-         "--method", "ase:*", "--method", "own:*euler", "--method", "sundials:*"],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
-    )  # fmt: skip
-    # no exact solution is known of it, so nothing tells how far a solver may be off
-    assert done.returncode == 2, done.stdout + done.stderr
-    assert "not judged: sundials:adams, sundials:bdf: nothing" in done.stdout
-    assert "not judged: ase" not in done.stdout
-    assert "ase:velocity-verlet" in done.stdout
-    assert "0 failed" in done.stdout
+@pytest.mark.parametrize(("name", "scene"), [("Sextic", "sextic"), ("Yukawa", "yukawa")])
+def test_a_term_that_is_pasted_goes_through_every_command(name: str, scene: str, tmp_path: Path) -> None:
+    (term,) = (block for block in blocks("python", DATA) if f"class {name}" in block)
+    assert len(term.splitlines()) <= 40
+    (tmp_path / "term.py").write_text(term)
+    (text,) = (block for block in blocks("toml", DATA) if f"[[{scene}]]" in block)
+    (tmp_path / "well.toml").write_text(text)
+
+    def done(*words: str) -> str:
+        command = [sys.executable, "-m", "springcheck", *words, "--engine", "term.py"]
+        found = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert found.returncode == 0, found.stdout + found.stderr
+        return found.stdout
+
+    said = done("run", "well.toml", "-o", "well.h5")
+    assert "0 failed" in said
+    for method in ("own:euler", "ase:velocity-verlet", "sundials:bdf"):
+        assert method in said
+    assert (name == "Yukawa") == ("openmm:verlet  " in said)
+    done("plot", "well.h5")
+    done("report", "well.h5", "-o", "well.html")
+    done("precision", "well.toml", "--method", "own:rk4", "--budget", "3", "--quiet")
+    done(
+        "judge", "well.h5", "--scene", "well.toml", "--scheme", "explicit-euler", "--trajectory", "own:euler"
+    )
 
 
 def test_the_table_of_terms_has_every_term_with_its_formula_and_columns() -> None:
     for term in known().values():
         assert term.formula in DATA, term.key
-        for column in term.columns:
+        for column in (x for x in term.columns if x.field != "number"):
             assert f"`{column.name}`" in DATA, (term.key, column.name)
 
 
@@ -68,7 +77,7 @@ def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.chdir(tmp_path)
     assert main(["run", "spring", "--method", "own:*euler", "--method", "openmm:verlet", "--quiet"]) == 0
     for block in (*blocks("python"), *blocks("python", DATA)):
-        if "class Sextic" not in block:
+        if "@register" not in block:
             exec(compile(block, "README", "exec"), {})
 
 

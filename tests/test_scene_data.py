@@ -13,8 +13,8 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from springcheck import checks, driver, store
-from springcheck.errors import SceneError, StoreError
+from springcheck import checks, driver
+from springcheck.errors import SceneError
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.builders import chain, spring
 from springcheck.physics.scene import Scene
@@ -46,22 +46,6 @@ def test_a_changed_scene_is_stored_as_what_it_is_and_run_again_as_that(tmp_path:
     (again,) = main_job.repeat(tmp_path / "x.h5")
     assert again.equal
     assert again.difference == 0
-
-
-def test_a_journal_of_another_scene_is_not_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = spring(steps=20)
-    with monkeypatch.context() as patch:
-        patch.setattr(store.Journal, "commit", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            main_job.run(scene, tmp_path / "x.h5", methods=[LABEL])
-    found = main_job.run(replace(scene, title="the same numbers"), tmp_path / "x.h5", methods=[LABEL])
-    assert found.resumed == (LABEL,)
-    with monkeypatch.context() as patch:
-        patch.setattr(store.Journal, "commit", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            main_job.run(scene, tmp_path / "y.h5", methods=[LABEL])
-    with pytest.raises(StoreError, match="force"):
-        main_job.run(replace(scene, p=3 * scene.p), tmp_path / "y.h5", methods=[LABEL])
 
 
 GOOD: dict[str, Any] = {
@@ -269,7 +253,6 @@ def test_a_shipped_scene_is_written_so_that_it_is_read_back(name: str) -> None:
     assert numbers(again) == numbers(scene)
     assert again.digest == scene.digest
     assert again.to_toml() == scene.to_toml()
-    assert len(scene.to_toml()) < 3000, "a long chain is written as one"
 
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=True)
@@ -338,7 +321,7 @@ def test_any_scene_is_written_so_that_it_is_read_back(scene: Scene) -> None:
     assert again.digest == scene.digest
 
 
-def test_a_chain_that_moves_in_no_few_waves_is_written_in_rows() -> None:
+def test_a_chain_is_written_by_its_positions() -> None:
     rng = np.random.default_rng(1)
     for scene in (
         chain(50, m=1.3, k=2.9, q=rng.normal(size=50), p=rng.normal(size=50)),
@@ -368,12 +351,6 @@ def test_springs_side_by_side_are_one_scene() -> None:
     assert all(v.passed is not False for v in checks.judge(scene, run))
     with pytest.raises(SceneError, match="broadcast together"):
         spring(m=[1.0, 2.0], k=[1.0, 2.0, 3.0])
-
-
-def test_a_run_of_a_scene_that_records_every_other_step_passes_its_times() -> None:
-    scene = replace(spring(), steps=8, every=2)
-    verdicts = {v.check: v.passed for v in checks.judge(scene, driver.run(scene, LABEL))}
-    assert verdicts["times"] is True
 
 
 def test_a_scene_without_a_title_has_its_name_for_one(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck.identify.families import FAMILIES, KNOWN_ELSEWHERE
-from springcheck.identify.maps import unit
+from springcheck.identify.catalogue import KNOWN_ELSEWHERE, of_scheme
+from springcheck.identify.rows import unit
 from springcheck.schemes import SCHEMES
 from springcheck.schemes.elsewhere import ELSEWHERE
 
@@ -44,7 +44,7 @@ def test_the_map_that_identify_compares_is_of_that_order(name: str) -> None:
     errors = []
     for x in (0.04, 0.02):
         wide = np.longdouble(x)
-        found = unit(FAMILIES[name], np.array([wide * wide], np.longdouble), np.zeros(1, np.longdouble))[0]
+        found = unit(of_scheme(name), np.array([wide * wide], np.longdouble), np.zeros(1, np.longdouble))[0]
         flow = np.array([[np.cos(wide), np.sin(wide) / wide], [-wide * np.sin(wide), np.cos(wide)]])
         # (q, v h): the velocity's unit makes the lower left entry smaller by x**2
         errors.append(float(np.max(np.abs(found - flow) / [[1, 1], [x * x, 1]])))

@@ -52,23 +52,6 @@ def test_a_word_that_names_nothing_is_one_line_with_status_2(
     assert word in said[-1]
 
 
-def test_programs_are_not_dropped_where_there_is_none_to_keep(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Without a folder it had written the corpus without its 246 trajectories of programs."""
-    corpus = FOLDER.parent / "data/reference/identify/cases.json"
-    before = corpus.read_bytes()
-    monkeypatch.setattr("sys.argv", ["identify_programs.py"])
-    try:
-        with pytest.raises(SystemExit) as ended:
-            runpy.run_path(str(FOLDER / "identify_programs.py"), run_name="__main__")
-        assert ended.value.code == 2
-        assert "FOLDER" in capsys.readouterr().err
-        assert corpus.read_bytes() == before
-    finally:
-        corpus.write_bytes(before)
-
-
 def _imported(part: ast.stmt) -> list[str]:
     if isinstance(part, ast.ImportFrom):
         return [str(part.module).split(".")[0]]

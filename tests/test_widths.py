@@ -10,12 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from springcheck import store
-from springcheck.cli import main, output
-from springcheck.physics import scenefile
-from springcheck.studies.precision import measure as precision
-from springcheck.studies.run import measure as run_study
-from springcheck.text.lines import COLUMN_GAP, Lines, TextTable, drawn, table
+from springcheck.cli import main
+from springcheck.text.lines import COLUMN_GAP, TextTable, drawn, table
 
 WIDTHS = (60, 80, 100, 200)
 
@@ -80,45 +76,6 @@ def test_every_word_of_a_pipe_is_on_every_terminal(
             assert max(map(len, text.splitlines())) <= width
 
 
-@pytest.mark.usefixtures("steady_clock")
-def test_every_word_of_a_study_of_precision_is_on_every_terminal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from springcheck import engines
-
-    scene = scenefile.load_scene("spring-uneven")
-    found = precision.record(scene, list(engines.match(("own:euler", "own:semi-implicit-euler"))), budget=0.5)
-
-    on_terminals(found.lines(), monkeypatch, capsys)
-
-
-def on_terminals(lines: Lines, monkeypatch: Patch, capsys: Captured) -> None:
-    """Every word of these lines in a pipe is on every terminal, and none is wider than it."""
-    printed = []
-    for width in (None, *WIDTHS):
-        capsys.readouterr()
-        with monkeypatch.context() as patch:
-            patch.setattr("sys.stdout.isatty", lambda wide=width: wide is not None, raising=False)
-            patch.setenv("COLUMNS", str(width or 1))
-            output.show(lines)
-        printed.append(bare(capsys.readouterr().out))
-        assert not Counter(printed[0].split()) - Counter(printed[-1].split()), width
-        # a folded line may end in a blank
-        wide = [line for line in map(str.rstrip, printed[-1].splitlines()) if len(line) > (width or 1 << 16)]
-        assert not wide, width
-
-
-def test_every_word_of_a_run_with_faults_is_on_every_terminal(
-    tmp_path: Path, monkeypatch: Patch, capsys: Captured
-) -> None:
-    scene = scenefile.load_scene("chain")
-    faults = ("heating", "mass")
-    found = run_study.run(scene, tmp_path / "r.h5", methods=["own:semi-implicit-euler"], faults=faults)
-    lines = found.lines()
-    # the store's name is as long as its folder's
-    on_terminals([line for line in lines if str(tmp_path) not in str(line)], monkeypatch, capsys)
-
-
 def rendered(made: TextTable, width: int) -> list[str]:
     from rich.console import Console
 
@@ -156,10 +113,6 @@ def test_a_column_without_a_title_is_broken_nowhere() -> None:
     named = rendered(made, 80)[1::3]
     assert named
     assert all(line.startswith("8 openmm:semi-implicit-euler  6e-15") for line in named)
-
-
-def test_a_store_is_named_as_it_is(folder: Path) -> None:
-    assert store.check(folder / "run.h5") == []
 
 
 @pytest.mark.parametrize("width", [40, 80])

@@ -1,7 +1,7 @@
 """Claim: `identify` names scheme and steps from states alone, never names another scheme, and never takes a
 systematic error for an arithmetic.
 
-    python validation/identify_census.py [FIRST COUNT [FILE [ALONE]]]
+    python validation/identify_census.py [FIRST COUNT [FILE]]
 
 Each trajectory is drawn at random: a scheme of the catalogue, or one with friction by any law and at any
 place in its step, or a force held over substeps; a spring that is stated or not, about an equilibrium at 0 or
@@ -16,51 +16,11 @@ no cause that is none of them.
 A class is what was drawn; what is said of it is counted.  What is written in capitals is wrong.  "Undecided"
 says: the scheme is known, and whether its arithmetic explains the rest cannot be judged.
 
-Steps are carried out in plain floats from the stages, without the matrices that `identify` matches.  With
+Steps are carried out in plain floats from the stages, without the matrices that `identify` matches.  Steps
+are carried out in plain floats from the stages, without the matrices that `identify` matches.  With
 FILE every block of 100 trajectories is kept in it, a line of JSON each: blocks that are there are not run
-again, and what is printed is the sum of all blocks of the file.  With ALONE = 1 it is given positions
-alone, and for one in three without friction that there is none.
-
-Numbers from 1,000,000 on draw few frames (5 to 101), text of 3 to 9 digits and up to 12 steps to a frame as
-well.
-
-Printed for 900000 to 999999, which nobody had looked at before (99,089 trajectories; the rest overflow):
-70131 named; 13090 not told apart; 10769 cause named; 4150 error seen; 417 error within rounding; 342
-undecided; 177 refused; 5 none; 7 WRONG CAUSE (901845, 907032, 908060, 962013, 977714, 979662, 988222); 1
-WRONG NAME (978850, text); no false fit. Half within 7 ms, 90 % 17, 99 % 66, all 632, with both cores busy.
-For 1200000 to 1249999 and 1300000 to 1349999 (99,605): 59690 named; 12606 undecided, nearly all of them
-text of few frames; 12308 not told apart; 10474 error seen; 3700 cause named; 496 error within rounding; 265
-refused; 41 none; 15 WRONG CAUSE; 5 WRONG NAME (1210084, 1238164, 1302398, 1302634, 1329425); 5 LISTED
-WITHOUT IT (1207872, 1231645, 1241818, 1241969, 1349762); no false fit. Half within 8 ms, 90 % 24, 99 % 141,
-all 1331.
-All names but 1329425, which makes nearly a whole turn between two frames of 3 digits, and all lists but
-1349762, 6 frames in single precision, are mended since: what was wrong was text of few frames, or of a
-motion that dies within a few, and an exact coincidence.
-For 1500000 to 1507199, 1510000 to 1521999, 1530000 to 1535599 and 710000 to 717099 (31,732, most of them of
-few frames): no WRONG NAME, no list without the scheme, no false fit; 8 none and 11 WRONG CAUSE, each on the
-version of its hour.  All are mended since but 1517947, which dies within a frame: its three frames that show
-the motion exclude no scheme, and that is said.
-For 800000 to 805499 and 2000000 to 2004399 (9,830), by the code after those mends: no WRONG NAME, no list
-without the scheme, no false fit, none called none; 1 WRONG CAUSE (804785: alternating steps of 2e-9), which
-is mended since.
-For 2100000 to 2101999 by the version of its hour, and 2200000 to 2201099 and 2300000 to 2300999 (4,079 in
-all): 2498 named; 510 undecided; 491 not told apart; 430 error seen; 127 cause named; 18 error within
-rounding; 4 refused; 1 none (2200312, 5 frames of 10 steps), which is mended since; nothing wrong.
-For 3100000 to 3101499 (1,496): 918 named; 178 undecided; 171 error seen; 170 not told apart; 47 cause named;
-9 error within rounding; 2 refused; 1 none (3100228, which dies within 12 frames); nothing wrong.
-For 0 to 299 alone: 200 among several; 58 named; 32 error seen; 7 error, and a fit.
-For 4000000 to 4015499 (15,446, of few frames and digits too): no WRONG NAME, no list without the scheme, no
-false fit; 2 none (4004816, 4010827) and 1 WRONG CAUSE (4005498, a wobble of 9.5e-10 said to be alternating
-steps); these three and 3100228 are mended since.
-For 5000000 to 5020999, after those mends (20,931): no false fit, no WRONG CAUSE; 12658 named; 2640 undecided;
-2470 not told apart; 2383 error seen; 638 cause named; 115 error within rounding; 22 refused; 1 none
-(5012182); 2 WRONG NAME (5006605, a step in single precision; 5014475, 5 frames) and 2 LISTED WITHOUT IT
-(5009346 and 5013672, 5 frames), which are mended since.
-For 8150000 to 8158560 (8,520), of which 8153007 was a false fit, 8154050 and 8157940 were given a wrong cause
-and 8152435 was called none, by the code after these four were mended: 4939 named; 1381 undecided; 944 error
-seen; 936 not told apart; 269 cause named; 45 error within rounding; 6 refused; nothing wrong, none called
-none.  For 8300000 to 8301499 (1,496), which nobody had looked at: 856 named; 259 undecided; 172 error seen;
-159 not told apart; 43 cause named; 5 error within rounding; 2 refused; nothing wrong, none called none.
+again, and what is printed is the sum of all blocks of the file.  Numbers from 1,000,000 on draw few frames (5
+to 101), text of 3 to 9 digits and up to 12 steps to a frame as well.
 """
 
 from __future__ import annotations
@@ -78,9 +38,8 @@ import numpy as np
 from arguments import arguments, script
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
-from springcheck.identify.families import DAMPED, PREDICTED, UNDAMPED, Family
-from springcheck.identify.hypothesis import aliases, frictionless
-from springcheck.identify.recurrence import classes
+from springcheck.identify.catalogue import FRICTION, PLAIN, PREDICTED, aliases
+from springcheck.identify.rows import Row
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 
@@ -115,11 +74,11 @@ class Draw:
 
     def __init__(self, rng: np.random.Generator, wide: bool = False) -> None:
         kind = rng.choice(["plain", "plain", "damped", "damped", "held"])
-        pool = {"plain": UNDAMPED, "damped": DAMPED, "held": UNDAMPED[:1]}[str(kind)]
-        self.family: Family = pool[int(rng.integers(len(pool)))]
+        pool = {"plain": PLAIN, "damped": FRICTION, "held": PLAIN[:1]}[str(kind)]
+        self.row: Row = pool[int(rng.integers(len(pool)))]
         self.held = int(rng.integers(2, 9)) if kind == "held" else 0
-        self.scheme = "held-force" if self.held else self.family.scheme
-        flow = self.family.flow
+        self.scheme = "held-force" if self.held else self.row.scheme
+        flow = self.row.scheme == "exact"
         self.error = str(rng.choice(ERRORS)) if rng.random() < 1 / 6 and not flow else ""
         self.second = ""
         self.size = float(10 ** rng.uniform(-12, -3))
@@ -130,12 +89,12 @@ class Draw:
         self.single = "" if flow or self.error else str(rng.choice(["", "", "", "h", "k", "m"]))
         self.form = "double" if self.error else str(rng.choice(["double", "double", "single", "text"]))
         self.stated = bool(rng.random() < 0.5)
-        limit = SCHEMES[self.family.scheme].limit
+        limit = SCHEMES[self.row.scheme].limit
         highest = min(1.5, 0.95 * limit) if limit > 0 else 1.0
         x = math.exp(rng.uniform(math.log(0.02), math.log(highest)))
         self.m, self.h = float(10 ** rng.uniform(-2, 2)), float(10 ** rng.uniform(-3, 1))
         self.k = self.m * (x / self.h) ** 2
-        self.g = float(rng.uniform(0.01, 0.3)) * min(x, 1.0) if self.family.damped and not self.held else 0.0
+        self.g = float(rng.uniform(0.01, 0.3)) * min(x, 1.0) if self.row.damped and not self.held else 0.0
         self.x = x
         scale = float(10 ** rng.uniform(-1, 2))
         self.at = float(rng.choice([0.0, 0.0, scale * rng.normal()]))
@@ -155,7 +114,8 @@ class Draw:
 
     def __str__(self) -> str:
         return (
-            f"{self.family.name}{f', held over {self.held}' if self.held else ''}, {self.stride} steps, "
+            f"{self.row.scheme}, {self.row.law}"
+            f"{f', held over {self.held}' if self.held else ''}, {self.stride} steps, "
             f"h w {self.x:.3g}, {self.form}, clock {self.clock}, single {self.single or '-'}, "
             f"at {self.at:.3g}, stated {self.stated}, {self.error} {self.size:.1e}, {self.second} "
             f"{self.second_size:.1e}"
@@ -178,7 +138,7 @@ class Draw:
             t = np.concatenate([[0.0], np.cumsum(np.full(steps, h))])
         given = (("h", h), ("k", k), ("m", m))
         h, k, m = (float(np.float32(x)) if self.single == name else x for name, x in given)
-        if self.family.flow:
+        if self.row.scheme == "exact":
             return self._flow(t)
         noise = np.random.default_rng(5).standard_normal(steps + 1)
         sizes = {self.second: self.second_size, self.error: self.size}
@@ -203,7 +163,7 @@ class Draw:
             q, v = (
                 self._held(q, v, step, m, force)
                 if self.held
-                else _step(self.family, q, v, step, m, k, self, force)
+                else _step(self.row, q, v, step, m, k, self, force)
             )
             q += sizes.get("drift of the position", 0.0) * abs(self.q)
             if (i + 1) % self.stride == 0:
@@ -231,13 +191,13 @@ class Draw:
 
 
 def _step(
-    family: Family, q: float, v: float, h: float, m: float, k: float, draw: Draw, force: Any
+    row: Row, q: float, v: float, h: float, m: float, k: float, draw: Draw, force: Any
 ) -> tuple[float, float]:
     """One step in plain floats."""
     rate = draw.g / draw.h
-    if family.stability[0]:
-        q, v = _tableau(family, q, v, h, m, k, draw, force, rate if not family.stages else 0.0)
-    for kind, share in family.stages:
+    if row.over:
+        q, v = _tableau(row, q, v, h, m, k, draw, force, rate if not row.stages else 0.0)
+    for kind, share in row.stages:
         c = float(number(share, np.longdouble)) * h
         if kind == "drift":
             q = q + c * v
@@ -254,24 +214,25 @@ def _step(
         else:
             half = (v - c * (force(q) / m)) / (1 - c * rate)
             v = v + c * (force(q) / m - rate * half)
-    if family.formula in PREDICTED:
+    place = row.law.removeprefix("explicit friction ")
+    if place in PREDICTED:
         begun = force(q) / m - rate * v
-        moved, early = v + h / 2 * begun, v + float(PREDICTED[family.formula]) * h * begun
+        moved, early = v + h / 2 * begun, v + (PREDICTED[place][0] / PREDICTED[place][1]) * h * begun
         q = q + h * moved
         v = moved + h / 2 * (force(q) / m - rate * early)
     return q, v
 
 
 def _tableau(
-    family: Family, q: float, v: float, h: float, m: float, k: float, draw: Draw, force: Any, rate: float
+    row: Row, q: float, v: float, h: float, m: float, k: float, draw: Draw, force: Any, rate: float
 ) -> tuple[float, float]:
-    scheme = SCHEMES[family.scheme]
+    scheme = SCHEMES[row.scheme]
     slopes: list[tuple[float, float]] = []
-    for row in scheme.a:
+    for weights in scheme.a:
         x, u = q, v
-        for c, (dq, dv) in zip(row, slopes, strict=False):
+        for c, (dq, dv) in zip(weights, slopes, strict=False):
             x, u = x + h * float(c) * dq, u + h * float(c) * dv
-        own = float(row[len(slopes)]) * h if len(row) > len(slopes) else 0.0
+        own = float(weights[len(slopes)]) * h if len(weights) > len(slopes) else 0.0
         if own:
             # u' = u + own (F(x + own u')/m - rate u'), linear
             u = (u + own * (force(x) / m)) / (1 + own * rate + own * own * k / m)
@@ -300,10 +261,7 @@ def judged(draw: Draw, found: Identification, hidden: bool) -> str:
         others = [words for name, words in CAUSES.items() if name not in (draw.error, draw.second)]
         said = [any(re.search(x, found.statement) for x in words) for words in (own, others)]
         return "cause named" if said[0] else "WRONG CAUSE" if said[1] and not hidden else "error seen"
-    same = {draw.scheme}
-    if draw.scheme in SCHEMES:
-        same |= {*aliases(draw.scheme), *(frictionless(draw.scheme) if not draw.g else ())}
-        same |= {f.scheme for f in UNDAMPED if not draw.g and draw.scheme in frictionless(f.scheme)}
+    same = {draw.scheme, *(() if draw.held else aliases(draw.row))}
     listed = any(x.scheme in same and x.stride == draw.stride for x in found.candidates)
     if found.verdict == "none":
         return "none"
@@ -335,27 +293,7 @@ def _hides(states: tuple[Floats, ...], stride: int) -> bool:
     return bool(np.max(np.abs(left)) <= 128 * 2.0**-52 * stride)
 
 
-def _alone(draw: Draw, found: Identification) -> str:
-    """The same of positions alone: right where the scheme is named, or one of those that share positions."""
-    same = next((x for x in classes() if draw.scheme in _names(x)), None)
-    right = _names(same) if same else {draw.scheme}
-    schemes = {found.scheme} if found.scheme else {x.scheme for x in found.candidates}
-    if draw.error:
-        # what a constant, or another stiffness and friction, takes up does not show in positions
-        return "error, and a fit" if found.fits else "error seen"
-    if not found.fits:
-        return "none"
-    if found.scheme:
-        return "named" if found.scheme in right else "WRONG NAME"
-    return "among several" if schemes & right else "NOT AMONG SEVERAL"
-
-
-def _names(families: tuple[Family, ...]) -> set[str]:
-    each = {family.scheme for family in families}
-    return each | {y for x in each if x in SCHEMES for y in (*aliases(x), *frictionless(x))}
-
-
-def said_of(number_: int, alone: bool = False) -> tuple[Draw, str, str, float] | None:
+def said_of(number_: int) -> tuple[Draw, str, str, float] | None:
     """What is said of one trajectory, its statement and the seconds of the call; None where it overflows."""
     draw = Draw(np.random.default_rng([4, number_]), wide=number_ >= WIDE)
     try:
@@ -370,24 +308,22 @@ def said_of(number_: int, alone: bool = False) -> tuple[Draw, str, str, float] |
     begun = time.process_time()
     try:
         q, v = (written(x, draw.form, n) for x, n in zip((q, v), draw.digits, strict=True))
-        speed = None if alone else v
-        still = 0.0 if alone and not draw.g and number_ % 3 == 0 else None
-        found = identify(t, q, v=speed, mass=draw.m, stiffness=stated, friction=still)
+        found = identify(t, q, v=v, mass=draw.m, stiffness=stated)
         hidden = bool(draw.error) and _hides(states, draw.stride)
-        said = _alone(draw, found) if alone else judged(draw, found, hidden)
+        said = judged(draw, found, hidden)
         statement = found.statement
     except IdentificationError as error:
         said, statement = f"refused: {str(error)[:60]}", ""
     return draw, said, statement, time.process_time() - begun
 
 
-def block(first: int, alone: bool = False) -> dict[str, Any]:
+def block(first: int) -> dict[str, Any]:
     """One block of trajectories: what was said of each class, what is wrong, and the seconds a call takes."""
     counts: Counter[str] = Counter()
     wrong: list[str] = []
     seconds: list[float] = []
     for at in range(first, first + BLOCK):
-        one = said_of(at, alone)
+        one = said_of(at)
         if one is None:
             continue
         draw, said, statement, spent = one
@@ -401,14 +337,14 @@ def block(first: int, alone: bool = False) -> dict[str, Any]:
 
 def main() -> None:
     """Print what was said, class by class, and everything that is wrong."""
-    given = arguments(__doc__, first=0, count=1000, file="", alone=0)
+    given = arguments(__doc__, first=0, count=1000, file="")
     path = Path(given.file) if given.file else None
     kept = [json.loads(line) for line in path.read_text().splitlines()] if path and path.exists() else []
     have = {one["first"] for one in kept}
     for first in range(given.first - given.first % BLOCK, given.first + given.count, BLOCK):
         if first in have:
             continue
-        kept.append(block(first, bool(given.alone)))
+        kept.append(block(first))
         if path:
             with path.open("a") as out:
                 out.write(json.dumps(kept[-1]) + "\n")

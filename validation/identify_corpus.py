@@ -4,7 +4,7 @@
 
 The trajectories lie in `data/reference/identify`: `cases.json` states of each how its truth is known, what
 is told of it, what is expected, and where in `states.npz` its numbers lie; `load` puts the two together.
-They are data, so that no change of the catalogue changes them; `identify_made.py` wrote them, by own loops.
+They are data, so that no change of the catalogue changes them; own loops and other programs made them.
 
 SHARE is the part that is run (1: all; tests run 0.1, drawn by the names).  What is said of each is judged:
 

@@ -39,11 +39,12 @@ FRAMES = 2000
 
 BARE = """
 import numpy, h5py, openmm, ase.md.verlet, sksundae.cvode
-from springcheck import load_scene, driver, engines
+from springcheck import engines, load_scene
+from springcheck.studies.precision import bare
 scene = load_scene("spring")
 for label in engines.match(("*",)):
     if engines.refusal(scene, label) is None:
-        driver.bare(scene, label)
+        bare.measure(scene, label)
 """
 
 

@@ -1,8 +1,8 @@
 """The seconds per step of a study of precision are the engine's own: springcheck adds nothing to them.
 
-Claim: what the study times (`driver.bare`: the engine started by springcheck, stepped in one call, read
-once) lies within 5 % of the same engine driven by a bare loop written by hand below, without springcheck's
-driver, measured in turn with it in this run; minimum of the repeats of each.  Runs take some
+Claim: what the study times (`studies.precision.bare`: the engine started by springcheck, stepped in one call,
+read once) lies within 5 % of the same engine driven by a bare loop written by hand below, without
+springcheck's driver, measured in turn with it in this run; minimum of the repeats of each.  Runs take some
 10 ms, so that some of three hundred fall between the interruptions of a busy machine.
 
 Command: python validation/timing_overhead.py        (30 s)
@@ -36,9 +36,10 @@ from ase import Atoms
 from ase.md.verlet import VelocityVerlet
 
 from arguments import arguments, script
-from springcheck import driver, engines
+from springcheck import engines
 from springcheck.engines.ase.simulation import Springs
 from springcheck.physics import scenefile as scenes
+from springcheck.studies.precision import bare
 
 M, K, Q, P = 3.7, 2.9, 0.3, 0.7
 WITHIN = 0.05
@@ -128,7 +129,7 @@ def main() -> int:
         for name, (loop, steps) in BARE.items():
             h = scene.step * scene.steps / steps
             here = replace(scene, step=h, steps=steps, every=steps)
-            found = driver.bare(here, engines.parse(name)).timing.run
+            found = bare.measure(here, engines.parse(name)).timing.run
             by_hand = loop(steps, h)
             best[name] = [min(best[name][0], by_hand / steps), min(best[name][1], found / steps)]
     print(f"{'':28}{'bare loop':>12}{'springcheck':>14}{'ratio':>8}")

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck import engines, interrupts
 from springcheck.bath import THERMOSTATS
 from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
-from springcheck.engines.contract import Label, Simulation, Stopped
+from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import EngineError, MethodError
 from springcheck.physics import memory
 from springcheck.physics.arrays import Floats
@@ -33,9 +33,6 @@ PIECE, WORK = 1 << 16, 1 << 22
 """Steps, and steps times particles, that an engine of fixed step takes in one call where frames lie further
 apart: between two calls a run can be interrupted.  Counts, not times: the numbers of a run must not depend on
 the speed of the machine."""
-
-UNHEARD = 0.25
-"""Longest call of an engine that cannot be interrupted, where its numbers are discarded [s]."""
 
 UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
 """Fill value of rows before an engine writes them: a NaN that no arithmetic produces."""
@@ -82,10 +79,10 @@ def play(
 ) -> Trajectory:
     """Run a scene and hand every recorded frame, the start first, to `sink`; returns the run without frames.
 
-    Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes
-    through.  For `planned` see `bare`.  A random method takes the seed that is given, or one that is drawn;
-    the run keeps it.  A scripted method also takes a generator in its place; the run then keeps no seed,
-    because nothing could make the same draws again.
+    Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes through.
+    `planned` is how many steps the caller will take in all: an engine that compiles decides by them.  A
+    random method takes the given seed, or draws one; the run stores it.  A scripted method also takes a
+    generator in its place, and then stores no seed.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.
@@ -263,54 +260,3 @@ def run(
     label = engines.parse(method) if isinstance(method, str) else method
     gather = Gather(scene)
     return gather.onto(play(scene, label, gather, progress=progress, seed=seed))
-
-
-class Bare(NamedTuple):
-    """Cost of running an engine alone, for one run of it: seconds of wall clock and force calls."""
-
-    timing: Timing
-    force_calls: int
-
-
-def bare(scene: Scene, label: Label, *, copies: int = 1, planned: int = 0) -> Bare:
-    """Time the engine alone: all steps in one call and one row read at the end, nothing recorded.
-
-    `copies` fresh runs are timed together, one after the other, where one is too short for the clock.
-    `planned` is how many steps the caller will
-    take in all: an engine that compiles decides by them, not by this one run, so that all runs of a study
-    use the same code.  Numbers that are not finite are timed like others: judge them by `play`.
-
-    Raises:
-        Stopped: the engine gave up.
-    """
-    method = engines.method(label)
-    engines.load(label.engine)
-    ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
-    began = perf_counter()
-    simulations = [engines.Started(ahead, label, 1) for _ in range(copies)]
-    start_seconds = perf_counter() - began
-    alone = [one.simulation for one in simulations]
-    q, p = np.empty((2, 1, scene.n))
-
-    def timed() -> float:
-        began = perf_counter()
-        for simulation in alone:
-            _advance_unread(simulation, scene.steps, scene.steps if method.adaptive else PIECE, q, p)
-        return perf_counter() - began
-
-    run_seconds = engines.guarded(label, timed)
-    return Bare(
-        timing=Timing(start=start_seconds / copies, run=run_seconds / copies),
-        force_calls=simulations[0].force_calls,
-    )
-
-
-def _advance_unread(simulation: Simulation, steps: int, piece: int, q: Floats, p: Floats) -> None:
-    """All steps and one row, in as few calls as Ctrl-C allows: one takes at most about `UNHEARD` seconds."""
-    while steps:
-        began = perf_counter()
-        some = min(piece, steps)
-        simulation.advance(some, q, p)
-        steps -= some
-        if perf_counter() - began < UNHEARD / 4:
-            piece *= 4

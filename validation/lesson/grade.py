@@ -24,7 +24,7 @@ from springcheck import schemes
 from springcheck.engines import module_of
 from springcheck.errors import SpringcheckError
 from springcheck.identify import identify_stepper
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.catalogue import names, title
 
 AIMS = {
     "one": "semi-implicit-euler",
@@ -36,7 +36,7 @@ AIMS = {
 }
 """What each is meant to be, whatever the file says; of other exercises the file's own `AIMS` does."""
 
-NAMED = {*schemes.known(), *(family.scheme for family in FAMILIES.values())}
+NAMED = {*schemes.known(), *names()}
 """What a function may be meant to be: the schemes that have a name here."""
 
 SECONDS = 5.0

@@ -41,11 +41,33 @@ def run(
 ) -> Report:
     """Run a scene by several methods, compare and judge them, as `springcheck run` does.
 
-    `methods` are labels, globs such as ``"own:*"``, or your own functions (see `simulate`); by default the
-    scene's. `path` saves everything in a store, and what an interrupted call has finished is reused; without
-    it nothing is left on disk.  `report["own:euler"]` is a trajectory.  `scheme` is the scheme that your
-    functions are judged against; by default the one that their states show. Raises SpringcheckError for all
-    errors that a user can correct.
+    Parameters
+    ----------
+    scene
+        A scene, the name of a shipped one, or the path of a scene file.
+    methods
+        Labels, globs such as ``"own:*"``, or functions as in `simulate`; by default the scene's methods.
+    path, force
+        Save the result in a store, and overwrite it.  Without `path` nothing is left on disk.  A store of an
+        interrupted call is resumed.
+    thorough
+        Also run checks that need further runs.
+    faults
+        Names of deliberate faults to run as well, as ``"friction=1e-3"``.
+    seed
+        Seed of random methods.
+    scheme
+        The scheme that functions are judged against; by default the one that their states show.
+
+    Returns
+    -------
+    Report
+        Rows, verdicts and comparison; ``report["own:euler"]`` is a trajectory.
+
+    Raises
+    ------
+    SpringcheckError
+        Any error that a user can correct.
     """
     from springcheck.studies.run import measure
 
@@ -69,13 +91,31 @@ def simulate(
     seed: int | None = None,
     scheme: str = "",
 ) -> Trajectory:
-    """Run a scene by one method, such as ``"ase:velocity-verlet"``; row 0 is the start.
+    """Run a scene by one method.
 
-    A function ``step(q, p, h, force, mass) -> (q, p)`` is a method too: it is called with numbers of one
-    particle, or arrays (n,); `scheme` is the scheme that it is judged against, by default the one that its
-    states show. `progress` is called with the number of steps done since its last call; `seed`, a whole
-    number, is that of a random method. Raises MethodError: no such method, or it cannot serve the scene, or
-    its engine is not installed, or the seed is no such number.
+    Parameters
+    ----------
+    scene
+        A scene, its name, or the path of its file.
+    method
+        A label such as ``"ase:velocity-verlet"``, or a function ``step(q, p, h, force, mass) -> (q, p)`` of
+        numbers for one particle, or arrays (n,).
+    progress
+        Called with the number of steps done since its last call.
+    seed
+        Seed of a random method, a whole number; drawn by default.
+    scheme
+        The scheme that a function is judged against; by default the one that its states show.
+
+    Returns
+    -------
+    Trajectory
+        t (f,) [T], q (f, n) [L] and p (f, n) [M L/T]; row 0 is the start.
+
+    Raises
+    ------
+    MethodError
+        No such method or seed, or the method cannot serve the scene, or its engine is not installed.
     """
     found = scene_of(scene)
     needed(print if progress is None else progress, Callable, "progress: a function")
@@ -88,10 +128,24 @@ def simulate(
 
 @typed
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
-    """Verdicts of all checks on a trajectory of this scene; `passed` is None for those that do not apply, and
-    the first failed one says what the states show; `cause` does where nothing that applied tells the scheme.
+    """Judge a trajectory of a scene by all checks.
 
-    Raises SpringcheckError for frames of another shape, or without a step, or of no scheme.
+    Parameters
+    ----------
+    scene
+        A scene, its name, or the path of its file.
+    trajectory
+        From `simulate`, `read` or ``Trajectory.from_arrays(..., scheme="velocity-verlet")``.
+
+    Returns
+    -------
+    Verdicts
+        A list; `passed` of a verdict is None where the check does not apply.  `cause` is the diagnosis.
+
+    Raises
+    ------
+    SpringcheckError
+        Frames of another shape than the scene's, or no step, or no scheme.
     """
     found, run = scene_of(scene), trajectory
     if not run.scheme:
@@ -134,7 +188,20 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
 def compare(
     scene: Scene | str | Path, trajectories: Mapping[str, Trajectory] | Sequence[Trajectory]
 ) -> Comparison:
-    """Largest differences of every pair of trajectories, and from the exact solution where it is known."""
+    """Compare trajectories of one scene with each other, and with the exact solution where it is known.
+
+    Parameters
+    ----------
+    scene
+        A scene, its name, or the path of its file.
+    trajectories
+        Trajectories by name, or a sequence of them with distinct labels.
+
+    Returns
+    -------
+    Comparison
+        Largest difference of every pair, relative to the initial energy norm.
+    """
     runs: Any = trajectories if isinstance(trajectories, Sequence | Mapping) else [trajectories]
     each = runs.items() if isinstance(runs, Mapping) else [(getattr(x, "label", ""), x) for x in runs]
     named = {label: needed(one, Trajectory, "a Trajectory") for label, one in each}
@@ -157,13 +224,27 @@ def identify(
     friction: float | None = None,
     step: float | None = None,
 ) -> Identification | dict[str, Identification]:
-    """Identify the scheme that made a trajectory, and its errors: from arrays t, q and p (or v), a
-    `Trajectory`, a DataFrame with columns t, q and p or v (t may be its index), a file, or an integrator
-    ``step(q, p, h, force, mass) -> (q, p)``.
+    """Identify the scheme that made a trajectory, and its errors.
 
-    t (f,), q, p and v (f, n) or (f,); a file gives one identification for each of its trajectories, by label.
-    `mass`, `stiffness`, `friction` (c of F = -c v) and `step` are stated values.  Raises IdentificationError
-    where the states do not show a scheme.
+    Parameters
+    ----------
+    found
+        Times t (f,) [T], a `Trajectory`, a DataFrame with columns t, q and p or v (t may be its index), the
+        path of a file, or an integrator ``step(q, p, h, force, mass) -> (q, p)``.
+    q, p, v
+        Positions, and momenta or velocities, (f,) or (f, n), where `found` are times.
+    mass, stiffness, friction, step
+        Stated values; `friction` is the c of a force -c v.
+
+    Returns
+    -------
+    Identification
+        Of a file, a dict with one for each of its trajectories, by label.
+
+    Raises
+    ------
+    IdentificationError
+        The states do not show a scheme.
     """
     from springcheck.identify import files
     from springcheck.identify.report import identify_arrays as of_states
@@ -206,7 +287,15 @@ def identify(
 def exact(scene: Scene | str | Path) -> Trajectory:
     """The exact solution at the frames of a scene, rounded to double precision.
 
-    Raises SpringcheckError where there is no reference solution.
+    Returns
+    -------
+    Trajectory
+        t (f,) [T], q (f, n) [L] and p (f, n) [M L/T].
+
+    Raises
+    ------
+    SpringcheckError
+        There is no reference solution.
     """
     found = scene_of(scene)
     if not solutions.has_true_motion(found):
@@ -219,7 +308,18 @@ def exact(scene: Scene | str | Path) -> Trajectory:
 
 @typed
 def read(path: str | Path) -> dict[str, Trajectory]:
-    """The trajectories of a store by label.  StoreError where it cannot be read."""
+    """Read the trajectories of a store.
+
+    Returns
+    -------
+    dict of str to Trajectory
+        By label.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be read.
+    """
     from springcheck.studies import keeper
 
     scene = keeper.stored_scene(path_of(path))

@@ -60,9 +60,14 @@ def stability(
     scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Stability:  # fmt: skip
-    """Measure limits of stability against theory, with the h omega and the largest step [T] on this scene.
+    """Measure limits of stability next to theory, in h omega, and the largest step [T] on this scene.
 
-    Methods as in `run`.
+    Parameters
+    ----------
+    scene, methods, path, force
+        As in `run`.
+    workers
+        Processes that measure at once.
     """
     from springcheck.studies.stability import measure
 
@@ -75,9 +80,16 @@ def extremes(
     methods: str | Step | Sequence[str | Step] = (), *, quick: bool = False,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Atlas:  # fmt: skip
-    """The atlas of extreme cases: steps, masses, amplitudes to the ends of the range, and who is right.
+    """Measure which methods are right at extreme steps, masses and amplitudes.
 
-    `quick` takes fewer cells (20 s).
+    Parameters
+    ----------
+    methods, path, force
+        As in `run`.
+    quick
+        Take fewer cells (20 s).
+    workers
+        Processes that measure at once.
     """
     from springcheck.studies.extremes import measure
 
@@ -90,7 +102,15 @@ def sampling(
     methods: str | Sequence[str] = (), *, path: str | Path | None = None, force: bool = False,
     workers: int = 1,
 ) -> Sampling:  # fmt: skip
-    """How well thermostats sample a spring: temperatures, precision and limits, each beside its law."""
+    """Measure how well thermostats sample a spring: temperatures, precision and limits, next to theory.
+
+    Parameters
+    ----------
+    methods, path, force
+        As in `run`.
+    workers
+        Processes that measure at once.
+    """
     from springcheck.studies.sampling import measure
 
     with taken(methods, force, workers, path) as (named, how):
@@ -99,8 +119,14 @@ def sampling(
 
 @typed
 def methods(scene: Scene | str | Path | None = None) -> Shelf:
-    """All known methods: label, scheme, whether it runs by default, and why it cannot be used (its engine is
-    not installed, or it cannot serve the `scene`); "" where it can."""
+    """All known methods.
+
+    Returns
+    -------
+    Shelf
+        Rows with label, scheme, whether it runs by default, and why it cannot be used: its engine is not
+        installed, or it cannot serve `scene`; "" where it can.
+    """
     from springcheck.cli import listing
 
     return Shelf(listing.methods(None if scene is None else scene_of(scene)))
@@ -116,10 +142,24 @@ def explain(word: str) -> Said:
 
 @typed
 def report(path: str | Path, output: str | Path | None = None) -> Path:
-    """Write a store as one HTML page that checks itself in a browser; `output` is its name with .html by
-    default.
+    """Write a store as one HTML page that checks itself in a browser.
 
-    StoreError where `path` cannot be read, or another file is where the page would be.
+    Parameters
+    ----------
+    path
+        The store.
+    output
+        The page; by default the store's name with .html.
+
+    Returns
+    -------
+    Path
+        Where the page is.
+
+    Raises
+    ------
+    StoreError
+        `path` cannot be read, or `output` is a file that is no such page.
     """
     from springcheck.cli import page
 

@@ -40,7 +40,7 @@ COARSEST = 2.0**-23
 LONG = 10
 """Rows for each column from which on a column is scaled by its own size: few rows would change its shape."""
 
-BLOCK = 20_000
+BLOCK = 50_000
 """Draws among which ties are counted: among more, right ones in single precision have many."""
 
 MOST_HIDDEN = 0.01

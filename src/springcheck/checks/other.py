@@ -56,13 +56,10 @@ class Kind:
     alone: Sequence[Rows] = ()
     """Single rows of them, where they may have each its own."""
     size: float = 0.0
-    power: int = 1
-    """-1 where a scene file has the inverse of the numbers."""
 
     def changed(self, here: NDArray[np.bool_] | None, x: float) -> Case:
         """The case with the number x in some rows, or with a factor x to all."""
-        more = x**self.power
-        return self.other(self.numbers * more if here is None else np.where(here, more, self.numbers))
+        return self.other(self.numbers * x if here is None else np.where(here, x, self.numbers))
 
     def farthest(self, rows: Sequence[Rows]) -> list[Rows]:
         """Those that are farthest off."""
@@ -177,8 +174,8 @@ def _kinds(case: Case) -> Iterator[Kind]:
             numbers = term.arrays[column.field]
             if numbers.dtype.kind == "f" and column.field != "number":
                 of_axes = alone if term.is_by_axes or place else []
-                other, power = partial(with_numbers, case, number, column.field), -1 if column.inverse else 1
-                yield Kind(name, " of ", numbers, other, least, objects, of_axes, reach, power)
+                other = partial(with_numbers, case, number, column.field)
+                yield Kind(name, " of ", numbers, other, least, objects, of_axes, reach)
     objects = _objects([((int(place) // 3,), 1) for place in places[:n]])
     for of, way in ((" of ", _heavier), (" that divides the force on ", _quicker)):
         yield Kind("mass", of, scene.m[:n], partial(way, case), off[:n], objects)
@@ -214,7 +211,7 @@ def _numbers(case: Case) -> Iterator[Number]:
         name, own = kind.name, kind.numbers
         for words, here in kind.farthest(kind.objects) + kind.farthest(kind.alone):
             if np.all(own[here] == own[here][0]):
-                value = float(own[here][0]) ** kind.power
+                value = float(own[here][0])
                 yield f"the {name}{kind.of}{words}", value, kind.size, partial(kind.changed, here)
         if len(kind.objects) > 1 or np.any(own != own[0]):
             yield f"a factor to each {name}", 1.0, 0.0, partial(kind.changed, None)

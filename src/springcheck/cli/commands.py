@@ -141,7 +141,10 @@ def _identify(options: Namespace) -> int:
     else:
         stated = {name: getattr(options, name) for name in ("mass", "stiffness", "friction", "step")}
         columns = _columns(options)
-        parts = [partial(_look, file, options.trajectory, columns, stated) for file in options.files]
+        look: Callable[..., Any] = _look
+        if options.scene is not None:
+            look = partial(_look_on, options.scene)
+        parts = [partial(look, file, options.trajectory, columns, stated) for file in options.files]
         answers = zip(options.files, _in_order(parts, options.workers), strict=True)
     many = len(options.files) > 1
     documents: list[dict[str, Any]] = []
@@ -207,6 +210,24 @@ def _look(file: str, trajectory: str | None, columns: list[str], stated: dict[st
         with output.readable(file):
             doubts = output.doubts(file) if formats.is_hdf5(Path(file)) else []
             return files.identify_file(Path(file), trajectory, columns, stated), doubts
+    except (SpringcheckError, OSError) as error:
+        return error
+
+
+def _look_on(
+    scene: str, file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None]
+) -> Any:
+    """As `_look`, of a file of a scene, whose force is known."""
+    from springcheck.cli import file as files
+    from springcheck.identify.steps import on_scene
+    from springcheck.physics.scenefile import load_scene
+
+    try:
+        with output.readable(file):
+            path, found = Path(file), load_scene(scene)
+            states = files.states_in(path, columns, stated["step"], trajectory)
+            judged, run, notes, _ = files.as_trajectory(path, states, found, "unknown")
+            return {path.name: on_scene(judged, run, notes)}, []
     except (SpringcheckError, OSError) as error:
         return error
 
@@ -287,6 +308,7 @@ COMMANDS = (
         argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         JSON,
+        ENGINE,
     )),
     Command("plot", "draw what is in a store, or in a file of any program, as PNG and SVG", _plot, (
         _FILE,
@@ -297,11 +319,13 @@ COMMANDS = (
         _STEPS,
         _GROUP,
         QUIET,
+        ENGINE,
     )),
     Command("report", "a store as one HTML page that checks itself in a browser", _report, (
         _FILE,
         argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html"),
         QUIET,
+        ENGINE,
     )),
     Command("show", "a shipped scene as a file to start from", _show, (
         argument("scene", metavar="SCENE"),
@@ -324,6 +348,7 @@ COMMANDS = (
         _NAMES,
         argument("--step", "--dt", type=float, metavar="H", help="is this the time step?"),
         argument("--scheme", metavar="NAME", help="is this the scheme?"),
+        argument("--scene", metavar="SCENE", help="the scene that it is of: schemes are tried by its force"),
         argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
         argument("--workers", type=processes, default=1, metavar="N",
@@ -344,8 +369,9 @@ COMMANDS = (
         argument("--partial", action="store_true", help="let a file pass that covers a part of the scene"),
         argument("--verdicts", action="store_true", help="print every check with its reason"),
         JSON,
+        ENGINE,
     )),
-    Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),
+    Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE, ENGINE)),
     Command("export", "one trajectory as a file of its own, for other tools", _export, (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),

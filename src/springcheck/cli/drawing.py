@@ -21,8 +21,8 @@ from springcheck.text.wording import count
 MOST_COORDINATES = 8
 """Most coordinates that are drawn of another program's file."""
 
-FEWEST_PERIOD_FRAMES, SAME_REACH = 12, 0.02
-"""Fewest frames of a period that lines may join; least relative change of an amplitude that is reported."""
+FEWEST_PERIOD_FRAMES = 12
+"""Fewest frames of a period that lines may join."""
 
 
 def need_matplotlib() -> None:
@@ -79,7 +79,7 @@ def draw_foreign(
     trajectory: str | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Draw the states in any program's file, as `draw`; `particle` is the index of a coordinate."""
-    from springcheck.cli.file import states_in
+    from springcheck.cli.taken import states_in
     from springcheck.figures import looks, render
     from springcheck.figures.charts import Bank, Chart, Curve, Scale
     from springcheck.figures.motion import periods
@@ -102,50 +102,27 @@ def draw_foreign(
     # with fewer frames in a period lines would be chords
     few = any(len(found.t) < FEWEST_PERIOD_FRAMES * periods(found.q[:, i]) for i in chosen)
 
+    solid = [name for name, look in looks.LOOKS.items() if look.linestyle == looks.SOLID]
+
     def curves(x: Any, y: Any, *, joined: bool) -> list[Curve]:
+        how: Any = {"dots": few, "line": joined or not few}
         return [
             Curve(
-                name=f"coordinate {i}",
-                group=solid[i % len(solid)],
-                x=x[:, i % x.shape[1]],
-                y=y[:, i],
-                dots=few,
-                line=joined or not few,
+                name=f"coordinate {i}", group=solid[i % len(solid)], x=x[:, i % x.shape[1]], y=y[:, i], **how
             )
             for i in chosen.tolist()
         ]
 
-    solid = [name for name, look in looks.LOOKS.items() if look.linestyle == looks.SOLID]
     q, t, y = (Scale(name=with_unit(x, found.units.get(x, ""))) for x in ("q", "t", name))
     charts = [
         Chart(title=f"{name} over q.", x=q, y=y, curves=curves(found.q, other, joined=False)),
         Chart(title="q over time.", x=t, y=q, curves=curves(found.t[:, None], found.q, joined=True)),
     ]
-    which = f", {trajectory}" if trajectory else ""
-    heading = f"{path.name}{which}: {_found(found.q[:, chosen[0]], len(found.t))}"
+    heading = f"{path.name}{f', {trajectory}' if trajectory else ''}: {count(len(found.t), 'frame')}"
     bad = np.flatnonzero(~np.isfinite(np.hstack([found.q, other])).all(axis=1))
-    heading += (
-        f"; not finite: {count(len(bad), 'frame')}, the first of them frame {bad[0]}" if len(bad) else ""
-    )
+    if len(bad):
+        heading += f"; not finite: {count(len(bad), 'frame')}, the first of them frame {bad[0]}"
     bank = Bank(name="states", title="Coordinates", charts=charts, heading=heading, size=(4.4, 3.8))
     folder.check(files_of(bank.name), into, path)
     with style():
         return folder.put(drawn(render.picture(bank), bank.name), into, path), notes
-
-
-def _found(q: Any, frames: int) -> str:
-    """How often a coordinate crosses its mean, and the change of its amplitude, in a sentence."""
-    from springcheck.figures.motion import periods
-
-    rounds = periods(q)
-    if rounds < 2 or not np.isfinite(q).all():
-        return count(frames, "frame")
-    quarter = len(q) // min(4, int(rounds))
-    first, last = (float(np.ptp(part)) for part in (q[:quarter], q[-quarter:]))
-    change = last / first - 1
-    reach = "reaches as far at the end"
-    if abs(change) >= SAME_REACH:
-        way = "less far" if change < 0 else "farther" if change < 1 else "as far"
-        times = f"{100 * abs(change):.0f} %" if change < 1 else f"{last / first:.3g} times"
-        reach = f"reaches {times} {way} at the end"
-    return f"crosses its mean {2 * rounds:.0f} times in {count(frames, 'frame')} and {reach}"

@@ -68,9 +68,8 @@ def _bare(name: str) -> str:
 
 def lines(name: str) -> Iterator[str]:
     """All explanations of a name.  SpringcheckError where it is unknown."""
-    known = schemes.known()
     # a scheme is found by its title too, which tables print
-    for scheme in known.values():
+    for scheme in schemes.known().values():
         if name in (scheme.name, scheme.title):
             return scheme_lines(scheme)
     if ":" in name:
@@ -78,33 +77,26 @@ def lines(name: str) -> Iterator[str]:
     # heavier to import, and rarely needed
     from springcheck.identify.meanings import MEANINGS
 
-    of_terms = terms.known()
-    parts = [_fault(fault) for fault in FAULTS if fault.name == name]
     # tables head their columns by the short names of checks
-    asked = [check for check in _CHECKS.values() if name in (check.name, check.short)]
-    parts[:0] = [check_lines(check) for check in asked]
+    parts = [check_lines(check) for check in _CHECKS.values() if name in (check.name, check.short)]
+    parts += [_fault(fault) for fault in FAULTS if fault.name == name]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
-    parts += [iter([_line(f"{name}, a term: {described(of_terms[name])}")])] if name in of_terms else []
+    if term := terms.known().get(name):
+        parts.append(_term(term))
     if said := word(name):
         parts.append(iter([f"{said[0]}: {said[1]}"]))
+    if not parts:
+        methods = [f"{x}:{method}" for x in engines.names() for method in engines.engine(x).methods]
+        # engines that are not asked for have schemes of their own
+        meant = [name] if name in schemes.known() else schemes.textbook(name)
+        parts = [scheme_lines(schemes.scheme(one)) for one in meant]
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))
-    methods = [
-        f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
-    ]
-    # engines that are not asked for have schemes of their own
-    if name in schemes.known():
-        return scheme_lines(schemes.scheme(name))
-    if meant := schemes.textbook(name):
-        return chain(*(chain(scheme_lines(schemes.scheme(one)), [""]) for one in meant))
-    others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *of_terms, *WORDS)
-    near = schemes.meant(name, others)
-    every = (
-        "; `springcheck list` shows the methods, checks, terms and schemes. Words that are explained: "
-        f"{', '.join(WORDS)}"
-    )
+    others = (*_CHECKS, *methods, *(x.name for x in FAULTS), *MEANINGS, *terms.known(), *WORDS)
+    every = f"; `springcheck list` shows the names, and these words are explained: {', '.join(WORDS)}"
     raise SpringcheckError(
-        f"{name!r} is not the name of a check, scheme, method, fault, finding, term or word{near or every}"
+        f"{name!r} is not the name of a check, scheme, method, fault, finding, term or word"
+        f"{schemes.meant(name, others) or every}"
     )
 
 
@@ -137,6 +129,16 @@ def meaning_lines(meaning: Meaning) -> Iterator[str]:
     yield _line(f"Does not see: {meaning.misses}")
     if meaning.source:
         yield _line(f"Source: {meaning.source}")
+
+
+def _term(term: Any) -> Iterator[str]:
+    """A term: its law, and the fields of its table."""
+    yield _line(f"{term.key}, a term: {described(term)}")
+    yield f"  energy   {term.formula}"
+    for column in (x for x in term.columns if x.field != "number"):
+        default = "" if column.default is None else f", {column.default:g} by default"
+        sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
+        yield f"  {column.name}: {sign}{default}"
 
 
 def _method(name: str) -> Iterator[str]:

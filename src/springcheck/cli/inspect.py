@@ -18,6 +18,9 @@ from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
 
+OF_RUNS, NOT_VERSIONS = ("outcome", "origin.seed"), ("seed", "threads", "draws")
+"""Parameters of each run that are printed, and numbers of its origin that are no versions."""
+
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
     """The studies of a store with their results.  StoreError where one of them cannot be read."""
@@ -46,17 +49,16 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     if summary.runs:
         known = summary.runs[0].parameters
         out += [
-            plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"),
+            plain(),
             *_left(summary),
-            plain(
-                f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
-                f"{known.get('cores')} cores, {known.get('system')}"
-            ),
-            plain(
-                f"  python {known.get('python')}, numpy {known.get('numpy')}, "
-                f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
-            ),
             _runs(summary),
+            plain(f"scene {known.get('scene_name')}, units {known.get('units')}", "dim"),
+            plain(
+                f"{known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
+                f"{known.get('cores')} cores, {known.get('system')}",
+                "dim",
+            ),
+            plain(f"versions: {_versions(summary)}; --json has them and the digests of each run", "dim"),
         ]
     out += [plain(f"table {name}") for name in summary.tables]
     for study, result in results:
@@ -82,18 +84,25 @@ def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory |
 
 
 def _runs(summary: store.Summary) -> TextTable:
-    rows = []
+    titles = ("trajectory", "frames", "n", "outcome", "seed")
+    rows = [
+        (run.label, str(run.frames), str(run.particles), *(str(run.parameters.get(x, "")) for x in OF_RUNS))
+        for run in summary.runs
+    ]
+    seeded = any(row[-1] for row in rows)
+    return table(titles[: 4 + seeded], [row[: 4 + seeded] for row in rows], left=("trajectory", "outcome"))
+
+
+def _versions(summary: store.Summary) -> str:
+    """Versions of the libraries of all runs, each once."""
+    of = ("python", "numpy", "h5py", "hdf5")
+    named = {name: str(summary.runs[0].parameters.get(name)) for name in of}
     for run in summary.runs:
-        known = run.parameters
-        versions = ", ".join(
-            f"{key[7:]} {known[key]}"
-            for key in known
-            if key.startswith("origin.") and key[7:] not in ("engine", "method", "velocity")
-        )
-        outcome, digest = str(known.get("outcome", "")), str(known.get("sha256", ""))[:12]
-        rows.append((run.label, str(run.frames), str(run.particles), outcome, versions, digest))
-    titles = ("trajectory", "frames", "n", "outcome", "versions", "sha256")
-    return table(titles, rows, left=("trajectory", "outcome", "sha256"), prose="versions")
+        known = {key[7:]: str(x) for key, x in run.parameters.items() if key.startswith("origin.")}
+        named |= {
+            key: x for key, x in known.items() if x[:1].isdigit() and key not in (*named, *NOT_VERSIONS)
+        }
+    return ", ".join(f"{name} {version}" for name, version in named.items())
 
 
 def _frames(run: Trajectory, stride: int, last: Trajectory, of: Units) -> Lines:

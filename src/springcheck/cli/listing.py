@@ -32,6 +32,7 @@ def listing() -> dict[str, Any]:
         "terms": [
             {"name": name, "formula": term.formula, "columns": [x.name for x in term.columns]}
             for name, term in terms.known().items()
+            if not issubclass(term, terms.ToPoints)
         ],
         "schemes": [
             {"name": one.name, "title": one.title, "order": one.order} for one in schemes.known().values()

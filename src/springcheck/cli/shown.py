@@ -12,9 +12,9 @@ from springcheck.errors import IdentificationError
 from springcheck.formats import States
 from springcheck.formats.columns import Fixed
 from springcheck.identify import files
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.catalogue import names as known_names
 from springcheck.identify.files import identify_states, of_arrays
-from springcheck.identify.taken import has_a_start, is_step_of, springs_of
+from springcheck.identify.steps import has_a_start, is_step_of, springs_of
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, Verdict
 
@@ -70,8 +70,10 @@ def other_scheme(scene: Scene, run: Trajectory, states: States) -> Verdict:
                 names |= {one.scheme, *one.aliases}
             alike = run.scheme in names or is_step_of(scheme, names, scene, run)
             # what has no name there is told by its own motion, below
-            if alike or run.scheme in FAMILIES or not (alone or mixed):
+            if alike or run.scheme in known_names() or not (alone or mixed):
                 return verdict(alike, said)
+        if "negative friction" in found.statement:
+            return verdict(False, said)
         # of the few digits of a motion that dies down or grows a cause may be read that is none
         said = "" if found.undecided or not any(x.shown for x in found.explanations[:1]) else said
     springs = (m, k, c) if states.p is not None else (np.ones_like(m), k / m, c / m)

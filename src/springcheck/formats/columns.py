@@ -21,10 +21,12 @@ Columns: TypeAlias = Mapping[str, Floats]
 Kind: TypeAlias = Literal["t", "q", "p", "v", "m"]
 
 NAMES: dict[Kind, str] = {
-    "t": r"t|time|times",
-    "q": r"q|r|(pos|position|positions|coordinate|coordinates)([_ ][xyz])?|[xyz]",
+    "t": r"t|time|times|zeit|temps|tid|tiempo",
+    "q": r"q|r|(pos|position|positions|coordinate|coordinates)([_ ][xyz])?|[xyz]|angle|theta|phi"
+    r"|auslenkung|ort|displacement|posisjon",
     "p": r"p(_?[xyz])?|(mom|momentum|momenta)([_ ][xyz])?",
-    "v": r"v(_?[xyz])?|(vel|velocity|velocities)([_ ][xyz])?|[qxyz](_?dot|')|d[qxyz]/?dt",
+    "v": r"v(_?[xyz])?|(vel|velocity|velocities)([_ ][xyz])?|[qxyz](_?dot|')|d[qxyz]/?dt|omega"
+    r"|angular[_ ]velocity|theta_?dot|speed|geschwindigkeit|vitesse|fart|hastighet",
     "m": r"m|mass|masses",
 }
 

@@ -1,209 +1,250 @@
-"""Fit of all hypotheses to measured maps at once, by Gauss-Newton and chi-squared.
-
-A hypothesis is a family of one-step maps, a number of steps to a frame, and a number of whole turns between
-two frames.  Each matrix root of the measured map is a possible step: its phase gives a first guess of
-(h w)**2 for every family, its determinant one of the friction, and the four entries decide.
-"""
+"""One score for every hypothesis: chi-squared of the four entries of the measured map, by one Gauss-Newton on
+the free numbers (a, g or a parameter, the scale of the velocities), with its degrees of freedom."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtri
 
-from springcheck.identify.families import Family
-from springcheck.identify.fit import Map
-from springcheck.identify.guesses import Guesses, Roots, first, least_squares, polished, roots_of_map
-from springcheck.identify.hypothesis import Joint, Match, Terms, most
-from springcheck.identify.maps import MapTable, table
+from springcheck.identify.catalogue import ORDER
+from springcheck.identify.guesses import STRONG, guesses
+from springcheck.identify.measure import Map
+from springcheck.identify.rows import Row, power, sizes, unit
 from springcheck.identify.storage import ROUNDING
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats
 
-WHOLE = 2
-"""Roundings of a step relative to the whole state, beside those relative to its increment."""
+CHANCE, LIKELY = 1e-7, 25.0
+"""Probability of a chi-squared that is excluded, and five standard errors."""
 
-COARSE_ERROR = 1e-9
-"""Error of the entries above which double precision suffices for their prediction."""
-
-
-class Target:
-    """A measured map with the covariance of its entries: of the fit, the scale of velocities, biased
-    forces."""
-
-    def __init__(self, found: Map, terms: Terms) -> None:
-        self.found, self.terms = found, terms
-        self.observed = found.entries.reshape(4)
-        self.ratio = found.size[1] / found.size[0]
-        self.largest = max(1.0, float(np.max(np.abs(self.observed))))
-        shear = (0 if terms.vague else terms.jitter) * self.observed.astype(np.float64) * [0, 1, -1, 0]
-        bias = terms.bias * np.repeat(found.residual, 2)
-        values, self.axes = np.linalg.eigh(found.covariance + np.outer(shear, shear) + np.diag(bias**2))
-        self.variance = np.maximum(values, 1e-15 * values[-1])
-
-    def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
-        """Reciprocal errors (4, c) along the axes of the covariance.
-
-        A coefficient, as h k or h/m, is rounded once, which no number of pairs averages out: an entry of the
-        map of s steps is uncertain by the roundings of the family's path times the increment of s steps.
-        """
-        added = np.minimum(np.sqrt(np.abs(x.a)) + np.abs(x.g), 1)
-        # neither are roundings of the whole state averaged out, but for sums in double precision
-        scaled = every.scaled[x.which] | (self.terms.rounding > ROUNDING)
-        whole = np.where(scaled, WHOLE, WHOLE / math.sqrt(len(self.found.z)))
-        whole = (every.path[x.which] * added + whole) * s * self.largest * self.terms.rounding
-        return np.asarray(1 / np.sqrt(self.variance[:, None] + whole**2))
-
-    def entries(self, every: MapTable, x: Guesses, s: Floats, values: Reals) -> Reals:
-        a, g, log_mass = values
-        if self.terms.log_stiffness is not None:
-            log_mass = self.terms.log_stiffness - 2 * np.log(s) - np.log(np.abs(a))
-        elif self.terms.scales:
-            log_mass = log_mass + np.array(self.terms.scales, values.dtype)[s.astype(int)]
-        return np.asarray(every.frame(x.which, a, g, log_mass, s, np.full(len(s), self.ratio, values.dtype)))
+SINGLE = 2.0**-24
 
 
-def matches(
-    found: Map, terms: Terms, families: tuple[Family, ...], strides: Iterable[int], *, far: bool = False
-) -> list[Match]:
-    """Best fit of each family and stride to a map, if chi-squared accepts it; with `far` in any case."""
-    every = table(families)
+@dataclass(frozen=True, kw_only=True)
+class Freedom:
+    """What a comparison leaves open beside a row's own numbers."""
+
+    jitter: float = 0.0
+    """Relative uncertainty of the interval, by which velocities scale."""
+    scale: bool = False
+    """Whether the scale of the velocities is one more number."""
+    prior: float = 0.0
+    """Standard error of the log of that scale, by the times; 0 where it may be any."""
+    rounding: float = ROUNDING
+    """Roundoff of the coefficients."""
+    growing: bool = False
+    """Whether friction may be negative."""
+    bias: float = 0.0
+    """Standard error of the entries beside that of the fit."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Match:
+    """A row with s steps to a frame, fitted to one map."""
+
+    row: Row
+    stride: int
+    turns: int
+    """Whole turns between two frames."""
+    a: float
+    g: float
+    a_error: float
+    g_error: float
+    log_scale: float
+    scale_error: float
+    chi2: float
+    freedom: int
+    entries: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A row and stride on every oscillator."""
+
+    row: Row
+    stride: int
+    parts: tuple[Match, ...]
+
+    @property
+    def chi2(self) -> float:
+        return sum(x.chi2 for x in self.parts)
+
+    @property
+    def simple(self) -> tuple[int, int, int, int]:
+        exact = -(self.row.scheme == "exact")
+        return max(x.turns for x in self.parts), self.stride, exact, ORDER.get(self.row.key, len(ORDER))
+
+
+def match(row: Row, found: Map, free: Freedom, strides: Iterable[int], *, far: bool = False) -> list[Match]:
+    """Best fit of a row at each stride, by Gauss-Newton; with `far` those too that do not fit."""
+    got = guesses(row, found, strides)
+    strong = row.damped and abs(_area(found) - 1) > STRONG
+    got = got if far or strong else _near(row, found, got)
+    if not len(got):
+        return []
+    s, turns = got[:, 0], got[:, 1]
+    x = np.concatenate([got[:, 2:4].T, np.zeros((1, len(got)))])
+    ratio, seen = found.size[1] / found.size[0], found.b.reshape(4)
+    which = [0] + [1] * bool(row.free) + [2] * free.scale
+    freedom = 4 - len(which) + bool(free.prior)
+    shear = free.jitter * seen.astype(float) * [0, 1, -1, 0]
+    values, axes = np.linalg.eigh(found.cov + np.outer(shear, shear) + free.bias**2 * np.eye(4))
+    values = np.maximum(values, 1e-15 * max(values[-1], 1e-300))
+    largest = max(1.0, float(np.max(np.abs(seen))))
+
+    def entries(x: Any, s: Any) -> Any:
+        m = power(unit(row, x[0], x[1]), s)
+        up = np.exp(-x[2]) / s * x.dtype.type(ratio)
+        return np.stack([m[:, 0, 0], m[:, 0, 1] * up, m[:, 1, 0] / up, m[:, 1, 1]])
+
+    def left(x: Any, s: Any, weight: Any) -> tuple[Any, Any]:
+        e = entries(x, s)
+        out = (axes.T @ (seen.astype(x.dtype)[:, None] - e).astype(float)) * weight
+        return e, np.vstack([out, x[2].astype(float) / free.prior]) if free.prior else out
+
     with np.errstate(all="ignore"):
-        roots = replace(roots_of_map(found, tuple(strides)))
-        if not len(roots.s):
-            return []
-        # the scale of velocities is as uncertain as the interval, and where it is known, that of a number in
-        # single precision
-        roots.error += terms.bias * float(np.max(found.residual))
-        roots.error += terms.rounding * 20 * float(np.max(roots.s))
-        roots.error += float(np.max(np.abs(terms.scales), initial=0.0))
-        free_scale = terms.mass_unknown
-        near = replace(roots, error=roots.error + terms.jitter)
-        x = first(every, near, growing=terms.growing, free_scale=free_scale, far=far)
-        # an interval that each hypothesis sets for itself leaves no error to the entries
-        roots, free_scale = (roots, True) if terms.vague else (near, free_scale)
-        if not all(family.flow for family in families):
-            # an exact solution has the phase and the determinant of the root from the start
-            x = polished(every, roots, x, free_scale=free_scale, far=far)
-        if not len(x.a):
-            return []
-        return solved(every, Target(found, terms), roots, x, far=far)
-
-
-def solved(
-    every: MapTable, target: Target, roots: Roots, x: Guesses, *, far: bool = False, every_turn: bool = False
-) -> list[Match]:
-    """Best fit from these guesses for each family and stride, of those that chi-squared accepts (`far`: of
-    all); with `every_turn` for each number of turns and each spring."""
-    terms = target.terms
-    free = [0, 1] if every.damped else [0]
-    if terms.vague or (terms.mass_unknown and terms.log_stiffness is None):
-        free.append(2)
-    freedom = len(target.observed) + terms.vague - len(free)
-    s = roots.s[x.root]
-    values = np.stack([x.a, x.g, np.zeros_like(x.a)])
-    if roots.error < COARSE_ERROR:
-        values = values.astype(np.longdouble)
-    if 2 in free:
-        predicted = target.entries(every, x, s, values)
-        scale = np.abs(predicted[1] / target.observed[1] * target.observed[2] / predicted[2])
-        values[2] = np.nan_to_num(np.log(scale) / 2)
-    weight = target.weight(every, x, s)
-
-    def left(values: Reals) -> tuple[Reals, Floats]:
-        entries = target.entries(every, x, s, values)
-        off = (target.observed[:, None] - entries).astype(np.float64)
-        known = [values[2].astype(np.float64) / terms.jitter] if terms.vague else []
-        return entries, np.vstack([target.axes.T @ off * weight, *known])
-
-    entries, r = left(values)
-    chi2 = np.sum(r**2, axis=0)
-    best = values, entries, chi2
-    errors = np.zeros((3, len(s)))
-    for _ in range(8):
-        slopes = []
-        for i in free:
-            d = np.abs(values[0]) * 1e-8 if i == 0 else np.full(len(s), 1e-8, values.dtype)
-            moved = values.copy()
-            moved[i] += d
-            slopes.append((r - left(moved)[1]) / d.astype(np.float64))
-        step, variance = least_squares(np.array(slopes), r)
-        errors[free] = np.sqrt(np.abs(variance))
-        limit = 0.5 * np.abs(values[0].astype(np.float64))
-        step[0] = np.clip(step[0], -limit, limit)
-        values = values.copy()
-        values[free] += step
-        entries, r = left(values)
-        new = np.sum(r**2, axis=0)
-        better = new < best[2]
-        gain = np.max((best[2] - new)[better] / (1 + new[better]), initial=0.0)
-        best = (np.where(better, values, best[0]), np.where(better, entries, best[1]),
-                np.where(better, new, best[2]))  # fmt: skip
-        if not gain > 1e-6:
-            break
-    values, entries, chi2 = best
-    good = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=0)
-    # a rounding of times is bounded: by chance an interval is off by its jitter at most
-    timed = np.abs(values[2]) <= terms.jitter if terms.vague else True
-    good &= (chi2 <= most(freedom)) & timed | far
-    if every.damped and not terms.growing:
-        good &= (values[1] > 0) | every.held[x.which]
-    kept: dict[tuple[Any, ...], tuple[float, float, int]] = {}
+        # double precision leaves few hypotheses to extended precision
+        for width, floor in ((np.float64, 1e-13), (np.longdouble, 0.0)):
+            x = x.astype(width)
+            size = np.max(sizes(row, x[0], x[1]).astype(float), axis=(1, 2))
+            added = np.minimum(np.sqrt(np.abs(x[0].astype(float))) + np.abs(x[1].astype(float)), 1)
+            whole = (row.roundings * added + 2) * s * np.maximum(size, 1) * largest * free.rounding
+            weight = 1 / np.sqrt(values[:, None] + whole**2 + (floor * largest) ** 2)
+            e, r = left(x, s, weight)
+            if free.scale and width is np.float64:
+                x[2] = np.nan_to_num(np.log(np.abs(e[1] / seen[1] * seen[2] / e[2])) / 2, posinf=0, neginf=0)
+                e, r = left(x, s, weight)
+            # few are given up once they are near
+            given_up = 99 if far or width is not np.float64 else 6 if strong else 2
+            kept, x, e, chi2, error = _gauss_newton(left, x, e, r, s, weight, which, given_up)
+            s, turns = s[kept], turns[kept]
+            if width is np.float64 and far:
+                x, e = x.astype(np.longdouble), e.astype(np.longdouble)
+                break
+            if width is np.float64:
+                some = np.isfinite(chi2) & (chi2 < 1e4)
+                x, s, turns = x[:, some], s[some], turns[some]
+                if not len(s):
+                    return []
+    good = np.isfinite(chi2) & np.all(np.isfinite(e), axis=0)
+    good &= far | (chi2 <= (chdtri(freedom, CHANCE) if freedom else 1e-4))
+    if row.damped and not free.growing:
+        good &= x[1] > 0
+    if row.damped and row.formula is None and len(row.under) == 1:
+        # polynomials of many stages take any value far beyond their limit
+        good &= np.abs(x[0]) <= BEYOND
+    best: dict[int, tuple[Any, int]] = {}
     for i in np.flatnonzero(good).tolist():
-        key: tuple[Any, ...] = int(x.which[i]), int(s[i])
-        if every_turn:
-            # one number of turns, to the left or right and on each branch of a scheme, is several springs
-            key += tuple(f"{float(y):.6g}" for y in values[:2, i])
-        # a free scale of velocities lets steps of several lengths fit: the shortest is the simplest
-        scaled = free[-1] == 2 and freedom <= 2 and not terms.vague
-        close = abs(float(values[0, i])) if scaled else float(chi2[i])
-        turns = float(roots.turns[x.root[i]])
-        rank = (0.0 if far else turns), close, i
-        kept[key] = min(kept.get(key, rank), rank)
-    out = []
-    for (which, stride, *_), (_, _, i) in kept.items():
-        a, g, log_mass = (float(y) for y in values[:, i])
-        if terms.log_stiffness is not None:
-            log_mass = terms.log_stiffness - 2 * math.log(stride) - math.log(abs(a))
-        elif terms.scales:
-            log_mass += terms.scales[stride]
-        out.append(
-            Match(
-                family=every.families[which].name, stride=stride, turns=int(roots.turns[x.root[i]]),
-                a=a, a_error=float(errors[0, i]), g=g, g_error=float(errors[1, i]), log_mass=log_mass,
-                mass_error=float(errors[2, i]), chi2=float(chi2[i]), freedom=max(freedom, 1),
-                predicted=tuple(entries[:, i].astype(np.longdouble)),
-            )
-        )  # fmt: skip
-    return out
+        open_ended = free.scale and not free.prior and freedom < 3
+        rank = (0 if far else turns[i], abs(float(x[0, i])) if open_ended else float(chi2[i]))
+        best[int(s[i])] = min(best.get(int(s[i]), (rank, i)), (rank, i))
+    return [
+        Match(
+            row=row, stride=n, turns=int(turns[i]), a=float(x[0, i]), g=float(x[1, i]),
+            a_error=float(error[0, i]), g_error=float(error[1, i]), log_scale=float(x[2, i]),
+            scale_error=float(error[2, i]), chi2=float(chi2[i]), freedom=freedom, entries=e[:, i],
+        )
+        for n, (_, i) in best.items()
+    ]  # fmt: skip
+
+
+BEYOND = 25.0
+"""Largest (h w)**2 of an explicit step that is tried."""
+
+NEAR, NEAR_FREE = 0.05, 1.5
+"""Distance of trace and of determinant from the measured ones at which a guess is given up, without a free
+number and with one."""
+
+
+def _near(row: Row, found: Map, got: Floats) -> Floats:
+    """The guesses whose map is near the measured one, whatever the scale of velocities."""
+    b = found.b.astype(float)
+    with np.errstate(all="ignore"):
+        m = power(unit(row, got[:, 2], got[:, 3]), got[:, 0])
+        off = [m[:, 0, 0] - b[0, 0], m[:, 1, 1] - b[1, 1], m[:, 0, 1] * m[:, 1, 0] - b[0, 1] * b[1, 0]]
+        least = np.max(np.abs(off), axis=0)
+    largest = max(1.0, float(np.max(np.abs(b))), float(abs(b[0, 1] * b[1, 0])))
+    error = 60 * math.sqrt(max(float(np.max(np.diag(found.cov))), 0.0))
+    most = NEAR_FREE if row.free else NEAR
+    near: Floats = got[least < most * largest * np.maximum(got[:, 0] / 4, 1) + error]
+    return near
+
+
+def _gauss_newton(
+    left: Any, x: Any, e: Any, r: Any, s: Any, weight: Any, which: list[int], given_up: int
+) -> tuple[Any, Any, Any, Floats, Floats]:
+    """Minimise the residuals over the free numbers: which are left, x (3, c), entries, chi-squared (c,) and
+    errors (3, c).  At the round `given_up` those are that do not converge."""
+    kept = np.arange(x.shape[1])
+    chi2, error, before = np.sum(r**2, 0), np.zeros(x.shape), np.inf
+    slow, eye = np.ones(x.shape[1]), 1e-14 * np.eye(len(which))
+    for i in range(14):
+        if i == given_up:
+            # what does not converge by now does not fit
+            going = (chi2 < 1e7) | (chi2 < 0.2 * before)
+            if not np.any(going):
+                return kept[:0], x[:, :0], e[:, :0], chi2[:0], error[:, :0]
+            kept, s, slow = kept[going], s[going], slow[going]
+            x, e, r, weight, error = (y[:, going] for y in (x, e, r, weight, error))
+            chi2 = chi2[going]
+        before, slopes = chi2, []
+        for k in which:
+            d = np.abs(x[0]) * 1e-7 if k == 0 else np.full(x.shape[1], 1e-7, x.dtype)
+            moved = x.copy()
+            moved[k] += d
+            slopes.append((r - left(moved, s, weight)[1]) / d.astype(float))
+        j = np.nan_to_num(np.array(slopes))
+        scale = np.sqrt(np.sum(j * j, 1))
+        scale[scale == 0] = 1
+        j = j / scale[:, None]
+        inverse = np.linalg.inv(np.einsum("iec,jec->cij", j, j) + eye)
+        step = np.einsum("cij,jec,ec->ic", inverse, j, np.nan_to_num(r)) / scale
+        error[which] = np.sqrt(np.abs(np.einsum("cii->ic", inverse))) / scale
+        most = 0.5 * np.abs(x[0].astype(float))
+        step[0] = np.clip(step[0], -most, most)
+        moved = x.copy()
+        moved[which] += step * slow
+        e2, r2 = left(moved, s, weight)
+        new = np.sum(r2**2, 0)
+        better = new < chi2
+        gain = np.max(((chi2 - new) / (1 + new))[better], initial=0)
+        going = bool(np.any(~better & (slow > 0.05) & (chi2 > 100) & (chi2 < 1e12)))
+        slow = np.where(better, 1.0, slow / 4)
+        x, e = np.where(better, moved, x), np.where(better, e2, e)
+        r, chi2 = np.where(better, r2, r), np.where(better, new, chi2)
+        if not (gain > 1e-5 or going):
+            break
+    return kept, x, e, chi2, error
 
 
 def compare(
-    maps: list[Map],
-    terms: list[Terms],
-    families: tuple[Family, ...],
-    strides: Iterable[int],
-    *,
-    far: bool = False,
+    maps: list[Map], free: Freedom, rows: Iterable[Row], strides: Iterable[int], *, far: bool = False
 ) -> list[Joint]:
-    """Families and strides that fit every oscillator, the simplest first; with `far` all, at their best.
-    What one oscillator excludes is not tried on the others."""
-    steps = list(strides)
-    parts: list[dict[tuple[str, int], Match]] = []
-    for found, what in zip(maps, terms, strict=True):
-        fitting = {(x.family, x.stride): x for x in matches(found, what, families, steps, far=far)}
-        parts.append(fitting)
-        families = tuple(f for f in families if any(f.name == name for name, _ in fitting))
-        steps = sorted({s for _, s in fitting})
-        if not families:
-            return []
-    shared = (key for key in parts[0] if all(key in x for x in parts))
-    joints = [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
-    return sorted(joints, key=lambda x: x.simplicity)
+    """Rows and strides that fit every oscillator, the simplest first."""
+    out, strides = [], list(strides)
+    for row in rows:
+        parts = [{x.stride: x for x in match(row, maps[0], free, strides, far=far)}]
+        for found in maps[1:]:
+            left = list(parts[-1])
+            parts.append({x.stride: x for x in match(row, found, free, left, far=far)} if left else {})
+        out += [Joint(row, s, tuple(x[s] for x in parts)) for s in parts[0] if all(s in x for x in parts)]
+    return sorted(out, key=lambda x: x.simple)
 
 
-nearest = partial(compare, far=True)
-"""Best fit of every family and stride, accepted or not."""
+def likely(joints: list[Joint]) -> list[Joint]:
+    """Those within five standard errors of the best."""
+    low = min((x.chi2 for x in joints), default=0.0)
+    return sorted((x for x in joints if x.chi2 <= low + LIKELY), key=lambda x: x.simple)
+
+
+def _area(found: Map) -> float:
+    return float(found.b[0, 0] * found.b[1, 1] - found.b[0, 1] * found.b[1, 0])
+
+
+def distance(found: Map, m: Match) -> float:
+    """Largest difference of the entries of a measured map and a row's."""
+    return float(np.max(np.abs((found.b.reshape(4) - m.entries).astype(float))))

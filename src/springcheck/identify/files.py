@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,11 @@ from springcheck import formats, schemes, store
 from springcheck.bath import THERMOSTATS
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
-from springcheck.identify.laws import COUPLED
+from springcheck.identify.circle import on_a_circle
 from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import UNTOLD, Identification
-from springcheck.identify.storage import ROUNDING
-from springcheck.identify.taken import seen_to_take
+from springcheck.identify.steps import seen_to_take
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
@@ -33,17 +31,6 @@ MOST_FAILED, MOST_RANDOM = 1000, 4000
 
 MOST_OSCILLATORS = 16
 """Most moving coordinates that are identified."""
-
-RIGID, TURNED = 1e-3, 0.05
-"""Largest relative change of a rod's length (programs have tolerances of 1e-4), and smallest rotation by
-which it shows [rad]."""
-
-SEVERAL = 8
-"""Ratio of the deviation of two particles from circles to that of their distance, up to which each is on an
-orbit of its own."""
-
-FEWEST_ON_ARC = 8
-"""Most frames that a circle in space, of four parameters, fits without significance."""
 
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
 TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "ms": 1e9, "us": 1e6}
@@ -159,82 +146,6 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
     return np.asarray(chosen), (*notes, *(more if len(moving) > MOST_OSCILLATORS else []))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RodSeen:
-    """A distance that particles keep as a rod keeps it, in a sentence."""
-
-    statement: str
-    or_springs: bool = False
-    """Whether circular orbits on springs keep it as well."""
-
-
-def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
-    """The rod in positions q (f, N), in space or a plane: two particles at a constant distance that turn, or
-    one that swings at a constant distance from a fixed point; None without a rod.
-
-    Where springs fit as well (`fits`), the direction of two particles must turn by more than their distance
-    changes; where each keeps to a circle of its own, springs may hold it (`or_springs`).
-    """
-    on_circles = None
-    for axes in (3, 2):
-        if q is None or q.shape[1] % axes:
-            continue
-        x = q[:, : axes * MOST_OSCILLATORS].reshape(len(q), -1, axes)
-        for a, b in combinations(range(x.shape[1]), 2):
-            way = x[:, b] - x[:, a]
-            length, off = _kept(way)
-            if off <= RIGID * length < np.inf and np.max(np.ptp(way, axis=0)) >= TURNED * length:
-                room = TURNED * _bent(way) if fits else np.inf
-                digits = SEVERAL * max(off, ROUNDING * np.max(np.abs(x[:, [a, b]])))
-                said = f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
-                if off <= room and fits and max(_kept(_arm(x[:, i]))[1] for i in (a, b)) <= digits:
-                    on_circles = RodSeen(statement=f"{said}, or circular orbits on springs", or_springs=True)
-                elif off <= room:
-                    return RodSeen(statement=said)
-        for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC and np.isfinite(x).all() else 0):
-            arm, bent = _arm(x[:, i]), _bent(x[:, i])
-            length, off = _kept(arm)
-            # a straight path lies on a circle as well, and an orbit may without a rod, but does not turn back
-            # a parabola, as of frequencies of 1 to 2, departs from its circle by some bent**2 / length
-            share = RIGID * min(TURNED**2 * length, bent)
-            least = max(off, ROUNDING * length)
-            if least * TURNED**2 * length <= share * bent and _turns_back(arm):
-                kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
-                return RodSeen(statement=f"particle {i} swings and {kept}")
-    return on_circles
-
-
-def _kept(way: Floats) -> tuple[float, float]:
-    """Mean length of a vector (f, 2 or 3), and the range of its lengths."""
-    size = np.linalg.norm(way, axis=1)
-    return float(np.mean(size)), float(np.ptp(size))
-
-
-def _bent(way: Floats) -> float:
-    """Root mean square distance of a path from its straight line."""
-    return float(np.linalg.svd(way - np.mean(way, axis=0), compute_uv=False)[1] / np.sqrt(len(way)))
-
-
-def _arm(way: Floats) -> Floats:
-    """Vector from the centre of the circle that fits a path (f, 2 or 3) best to each of its points."""
-    way = way - np.mean(way, axis=0)
-    # whose squares stay in range
-    size = float(np.max(np.abs(way))) or 1.0
-    way = way / size
-    # |way - c| = l is linear in c and l**2 - c**2
-    centre = np.linalg.lstsq(np.column_stack([2 * way, np.ones(len(way))]), np.sum(way**2, axis=1))[0]
-    return np.asarray((way - centre[:-1]) * size)
-
-
-def _turns_back(arm: Floats) -> bool:
-    """Whether a vector (f, 2 or 3) from a centre turns by less than a right angle a frame, and reverses."""
-    outer = np.einsum("fi,fj->fij", arm[:-1], arm[1:])
-    turned = (outer - outer.transpose(0, 2, 1)).reshape(len(outer), -1)
-    along = turned @ turned[np.argmax(np.linalg.norm(turned, axis=1))]
-    near = np.all(np.sum(arm[1:] * arm[:-1], axis=1) > 0)
-    return bool(near and np.min(along) < -RIGID * np.max(along))
-
-
 def sentence(
     run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0, few: bool = False,
     damped: bool = True,
@@ -287,7 +198,7 @@ def shown(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
     k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
     said = sentence(run, scene.m, k, about=about, few=few, damped=scene.system.is_damped)
     # springs couple the particles of a scene that has them
-    coupled = not alone and said.startswith(str(COUPLED.cause).partition(":")[0])
+    coupled = not alone and said.startswith("The oscillators are coupled")
     own = taken.rpartition(" of ")[2].casefold()
     return said if said.casefold().startswith(own) and not coupled else taken
 
@@ -321,17 +232,15 @@ def identify_file(
 
 
 def of_springs(told: Identification, q: Floats | None, *, stated: bool) -> Identification:
-    """An identification of states with positions q (f, N), as long as these show no rod, or springs are
-    `stated`.  Raises IdentificationError."""
-    fits = told.verdict != "none"
+    """An identification of states with positions q (f, N), which says so where these keep to a circle as on a
+    rod, unless springs are `stated` and fit.  Raises IdentificationError."""
+    if told.verdict != "none" or q is None:
+        return told
     with np.errstate(all="ignore"):
-        rod = None if fits and stated else rod_of(q, fits=fits)
-    if rod and not rod.or_springs:
-        raise IdentificationError(
-            f"{rod.statement}; constraints are not part of springcheck"
-            f"{'; if springs hold it, state their --stiffness' if fits else ''}"
-        )
-    return told.noting(rod.statement) if rod else told
+        said = on_a_circle(q)
+    if said:
+        raise IdentificationError(f"{said}; constraints are not part of springcheck")
+    return told
 
 
 def identify_states(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from springcheck.identify.families import FAULTS
+from springcheck.identify.catalogue import FAULTS
 
 GEOMETRIC = "Hairer, Lubich & Wanner, Geometric Numerical Integration (2006)"
 
@@ -78,14 +78,14 @@ _KNOWN = (
 
 _FAULTS = tuple(
     Meaning(
-        name=one.scheme.replace(" ", "-"),
-        title=one.cause,
+        name=one.scheme,
+        title=one.fault,
         formula="a one-step map of its own, found like a scheme's; see one-step-map",
         sees="exactly this mistake: every state is explained by it to rounding, and by no known scheme",
         misses=f"other mistakes of the same map.  What to do: {one.remedy}",
     )
     for one in FAULTS
-    if not one.stability[0]
+    if not one.over
 )
 
 MEANINGS = {one.name: one for one in (*_KNOWN, *_FAULTS)}

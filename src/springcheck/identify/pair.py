@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import MethodError, told
-from springcheck.identify.families import title
+from springcheck.identify.catalogue import title
 from springcheck.identify.result import Explanation
-from springcheck.identify.taken import takers
+from springcheck.identify.steps import takers
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring

@@ -1,67 +1,65 @@
-"""Recorded states at a constant interval, checked, with the resolution of their numbers."""
+"""Recorded states at a constant interval, with the resolution of their numbers: the observation model."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES, clock_of
-from springcheck.identify.storage import BINARY, ROUNDING, Storage, storage
+from springcheck.identify.storage import ROUNDING, Storage, storage
 from springcheck.physics.arrays import Extended, Floats
-
-LEAST = 2.0**-102
-"""Smallest factor whose product with another of 2**-24 or more is a normal number of single precision."""
-
-DEEP = 2.0**-30
-"""Resolution of a file, relative to its largest number, that resolves the roundings of single precision."""
 
 SIZES = 1e-75, 1e75
 """Smallest and largest magnitudes accepted: their fourth powers neither underflow nor overflow."""
 
-
 THROUGH_A_PRODUCT = 14
 """Most digits of text that a product with a mass and the quotient by it leave as they were."""
 
+LEAST = 2.0**-102
+"""Smallest factor whose product with another of 2**-24 or more is a normal number of single precision."""
+
 AT_REST = "nothing moves: at rest all schemes agree; start away from rest"
+ONE_STATE = "all frames are the same state, with a velocity that is not 0: they may be one array, stored by "
+ONE_STATE += "reference; store a copy in each frame"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record:
-    """Positions q and velocities v (f, n) of n coordinates at f frames, one interval apart.
+    """Positions q and velocities v (f, n) at f frames, one interval apart.
 
     v holds momenta, and `momenta` is set, where neither velocities nor masses are known.
     """
 
     interval: np.longdouble
     jitter: float
-    """Relative uncertainty of the interval, from the rounding of the recorded times."""
+    """Relative uncertainty of the interval, from the rounding of the times."""
     clock: float
-    """Rounding of the recorded times, in intervals."""
-    unlike: float
-    """The part of it that steps may have: decimals are those of a file."""
-    deviations: Extended | None
-    """Relative deviation (f - 1,) of each interval from the mean; None where times are coarse or even."""
+    """Rounding of a time, in intervals."""
     q: Extended
     v: Extended
-    q_quantum: Floats
-    v_quantum: Floats
-    q_storage: Storage
-    v_storage: Storage
+    dq: Floats
+    """Spacing (f, n) of the numbers that positions are written with."""
+    dv: Floats
+    names: tuple[str, str]
+    """Storage formats of positions and velocities."""
     mass: Floats | None
     momenta: bool
-    parts: tuple[Floats, Floats] | None = None
-    """Sums (f, n) of the absolute values of the terms of positions and velocities, where these are normal
-    modes: their rounding is relative to these sums."""
-    rough: bool = False
-    """Whether errors of forces that are as small as those of single precision need not be noise."""
+    mixed: bool = False
+    """Whether the numbers are combinations of recorded ones: normal modes."""
+
+    @property
+    def coarse(self) -> tuple[bool, bool]:
+        """Whether positions, velocities, have fewer digits than double precision."""
+        q, v = (name != "double" for name in self.names)
+        return q, v
 
     @property
     def fine(self) -> bool:
         """Whether positions and velocities are stored in double precision."""
-        return self.q_storage.name == self.v_storage.name == "double"
+        return not any(self.coarse)
 
     @property
     def moving(self) -> list[int]:
@@ -69,61 +67,27 @@ class Record:
         spread = np.ptp(self.q, axis=0) + np.ptp(self.v, axis=0) * abs(self.interval)
         return list(np.flatnonzero(spread > SIZES[0]).tolist())
 
-    def quanta(self, j: int) -> Floats:
-        """Spacing of the representable numbers around each state (f, 2) of coordinate j, on (q, v T)."""
-        return np.stack([self.q_quantum[:, j], self.v_quantum[:, j] * abs(float(self.interval))], axis=1)
-
-    def sigma(self, j: int) -> Floats:
-        """Standard error (f, 2) of the recorded states (q, v T) of coordinate j from their storage; 0 in
-        double precision, whose rounding is part of the arithmetic."""
-        coarse = [self.q_storage.name != "double", self.v_storage.name != "double"]
-        return np.asarray(self.quanta(j) * coarse / np.sqrt(12.0))
-
-    def summed(self, j: int) -> Floats:
-        """Size (f, 2) to which the rounding of each state (q, v T) of coordinate j is relative: its own, or
-        the sum of the absolute values of its terms."""
-        q, v = self.parts or (np.abs(self.q).astype(np.float64), np.abs(self.v).astype(np.float64))
-        return np.stack([q[:, j], v[:, j] * abs(float(self.interval))], axis=1)
-
-    @property
-    def deep(self) -> bool:
-        """Whether the states resolve single precision's roundings: `fine`, or text of enough digits."""
-        pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
-        return self.fine or all(
-            bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY
-            for (x, quantum), x_storage in zip(pairs, (self.q_storage, self.v_storage), strict=True)
-        )
-
     @property
     def vague(self) -> bool:
-        """Whether the states show the interval more exactly than the times do: these are no double precision,
-        whose deviations steps may follow, and not even."""
-        return self.fine and self.deviations is None and self.jitter > 2.0**-50
+        """Whether states of double precision show the interval more exactly than the times do."""
+        return self.fine and self.jitter > 1e-12 and not self.momenta
 
-    @property
-    def text(self) -> bool:
-        """Whether positions or velocities are decimal text."""
-        return any(x.name.startswith("text") for x in (self.q_storage, self.v_storage))
+    def along(self, rows: Extended) -> Record:
+        """The record of combinations (m, n) of the coordinates."""
+        size = np.abs(rows.T).astype(np.float64)
+        least = [2.0**-52 * np.max(np.abs(x), axis=0) for x in (self.q, self.v)]
+        dq, dv = (
+            np.maximum(x, y).astype(np.float64) @ size for x, y in zip((self.dq, self.dv), least, strict=True)
+        )
+        q, v = self.q @ rows.T, self.v @ rows.T
+        return replace(self, q=q, v=v, mass=None, momenta=False, mixed=True, dq=dq, dv=dv)
 
-
-def _states(x: ArrayLike, name: str, frames: int) -> Floats:
-    out = np.asarray(x, dtype=np.float64)
-    if out.ndim == 1:
-        out = out[:, None]
-    if out.ndim != 2 or out.shape[0] != frames:
-        raise IdentificationError(f"{name} has shape {np.shape(x)}, and the times ({frames},)")
-    if not np.all(np.isfinite(out)):
-        frame = int(np.argmin(np.all(np.isfinite(out), axis=1)))
-        raise IdentificationError(f"{name} is not finite in frame {frame}; give the part before it")
-    return out
-
-
-def _alive(positions: Floats, moving: Floats) -> int:
-    """Number of frames before a decaying motion underflows in products of single precision; later states
-    follow no scheme's step."""
-    alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
-    last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
-    return last + 1 if last + 1 >= FEWEST_STATES else len(positions)
+    def of(self, which: list[int]) -> Record:
+        """The record of some coordinates alone."""
+        return replace(
+            self, q=self.q[:, which], v=self.v[:, which], dq=self.dq[:, which], dv=self.dv[:, which],
+            mass=None if self.mass is None else self.mass[which],
+        )  # fmt: skip
 
 
 def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -> Floats | None:
@@ -145,23 +109,35 @@ def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -
     return np.broadcast_to(out, (n,)).copy()
 
 
-def read(
-    t: ArrayLike,
-    q: ArrayLike,
-    p: ArrayLike | None,
-    v: ArrayLike | None,
-    mass: ArrayLike | None,
-    last: Floats | None = None,
-) -> Record:
-    """Record of times (f,), positions, and momenta or velocities (f, n).  `last` is the unit of the last
-    decimal of velocities (n,), where they were written in other units.  Raises IdentificationError."""
+def _states(x: ArrayLike, name: str, frames: int) -> Floats:
+    out = np.asarray(x, dtype=np.float64)
+    out = out[:, None] if out.ndim == 1 else out
+    if out.ndim != 2 or out.shape[0] != frames:
+        raise IdentificationError(f"{name} has shape {np.shape(x)}, and the times ({frames},)")
+    if not np.all(np.isfinite(out)):
+        frame = int(np.argmin(np.all(np.isfinite(out), axis=1)))
+        raise IdentificationError(f"{name} is not finite in frame {frame}; give the part before it")
+    return out
+
+
+def times_of(t: ArrayLike) -> Floats:
+    """Times (f,), checked.  Raises IdentificationError."""
     times = np.asarray(t, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
     if len(times) < FEWEST_STATES:
-        raise IdentificationError(
-            f"too few states to read a map from: {len(times)}; give {FEWEST_STATES} or more"
-        )
+        few = f"too few states to read a map from: {len(times)}; give {FEWEST_STATES} or more"
+        raise IdentificationError(few)
+    return times
+
+
+def read(
+    t: ArrayLike, q: ArrayLike, p: ArrayLike | None, v: ArrayLike | None, mass: ArrayLike | None,
+    last: Floats | None = None,
+) -> Record:  # fmt: skip
+    """Record of times (f,), positions, and momenta or velocities (f, n).  `last` is the unit of the last
+    decimal of velocities (n,), where they were written in other units.  Raises IdentificationError."""
+    times = times_of(t)
     positions = _states(q, "q", len(times))
     given = [_states(x, name, len(times)) for name, x in (("p", p), ("v", v)) if x is not None]
     for x in given:
@@ -169,83 +145,93 @@ def read(
             raise IdentificationError(
                 f"positions have shape {positions.shape}, momenta or velocities {x.shape}: they must agree"
             )
+    moving = given[-1]
+    if (
+        len(times) > FEWEST_STATES
+        and np.any(moving)
+        and not (np.ptp(positions, 0).any() or np.ptp(moving, 0).any())
+    ):
+        raise IdentificationError(ONE_STATE)
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         clock = clock_of(times)
-        interval = clock.interval
+        pace = abs(float(clock.interval))
         sizes = {
-            "times": abs(float(interval)),
-            "positions": float(np.max(np.abs(positions), initial=0.0)),
-            "velocities times the interval": float(np.max(np.abs(given[-1]), initial=0.0))
-            * abs(float(interval)),
-        }
+            "times": pace, "positions": float(np.max(np.abs(positions), initial=0.0)),
+            "velocities times the interval": float(np.max(np.abs(moving), initial=0.0)) * pace,
+        }  # fmt: skip
     for name, size in sizes.items():
         if size and not SIZES[0] < size < SIZES[1]:
             raise IdentificationError(
                 f"{name} are of the size {size:.1g}: give them in units in which that is from "
                 f"{SIZES[0]:g} to {SIZES[1]:g}, or of an unstable motion the part before"
             )
+    masses = _masses(positions, given, mass)
+    unit = np.ones(positions.shape[1]) if v is not None or masses is None else masses
+    # the start is what a program was given; what it computed shows how it computes
+    computed = slice(1 if len(times) > FEWEST_STATES else 0, None)
+    q_storage = storage(positions[computed])
+    v_storage, dv = _of_velocities(moving, unit, computed, last)
+    kept = slice(None)
+    if not q_storage.name == v_storage.name == "double":
+        kept = slice(_alive(positions, moving))
+    return Record(
+        interval=clock.interval, jitter=clock.jitter, clock=clock.quantum,
+        q=positions[kept].astype(np.longdouble), v=moving[kept].astype(np.longdouble) / unit,
+        dq=q_storage.quantum(positions[kept]), dv=dv[kept], names=(q_storage.name, v_storage.name),
+        mass=masses, momenta=v is None and masses is None,
+    )  # fmt: skip
+
+
+def _masses(positions: Floats, given: list[Floats], mass: ArrayLike | None) -> Floats | None:
+    """The stated masses (n,), or those that momenta and velocities give."""
     masses = of_size("mass", mass, positions.shape[1])
-    if p is not None and v is not None and masses is None:
+    if len(given) == 2 and masses is None:
         weight = np.sum(given[1] ** 2, axis=0)
         masses = np.sum(given[0] * given[1], axis=0) / np.where(weight == 0, 1.0, weight)
         masses = np.where(weight == 0, 1.0, masses)
         if np.any(masses <= 0):
             raise IdentificationError("momenta and velocities point opposite ways: one of them is wrong")
-    moving = given[-1]
-    unit = np.ones(positions.shape[1], dtype=np.longdouble)
-    if v is None and masses is not None:
-        unit = masses.astype(np.longdouble)
-    # the start is what a program was given; only what it computed shows how it computes
-    computed = slice(1 if len(times) > FEWEST_STATES else 0, None)
-    q_storage, v_storage = storage(positions[computed]), storage(moving[computed])
-    if v is not None and last is not None and np.any(last) and v_storage.name == "double":
-        v_storage, quantum = Storage(name="text, fixed decimals"), np.broadcast_to(last, moving.shape)
-        v_storage = q_storage if q_storage.decimals is not None else v_storage
-    elif v is None and masses is not None and v_storage.name == "double":
+    return masses
+
+
+def _of_velocities(
+    moving: Floats, unit: Floats, computed: slice, last: Floats | None
+) -> tuple[Storage, Floats]:
+    """Storage of momenta or velocities, and the spacing of velocities (f, n)."""
+    found = storage(moving[computed])
+    if found.name == "double" and last is not None and np.any(last):
+        return Storage(name="text, fixed decimals"), np.broadcast_to(last, moving.shape).copy()
+    if found.name == "double" and np.any(unit != 1):
         # momenta made as m v from velocities in single precision or text are so only after the division
-        made = moving[computed] / masses
+        made = moving[computed] / unit
         text = np.array([float(f"{x:.{THROUGH_A_PRODUCT}g}") for x in made.flat]).reshape(made.shape)
-        v_storage = storage(text if np.all(np.abs(text - made) <= 2 * np.spacing(np.abs(made))) else made)
-        quantum = v_storage.quantum(moving / masses)
-    else:
-        quantum = v_storage.quantum(moving) / unit.astype(np.float64)
-    finely = q_storage.name == v_storage.name == "double"
-    kept = slice(None if finely else _alive(positions, moving))
-    return Record(
-        interval=interval,
-        jitter=clock.jitter,
-        clock=clock.quantum,
-        unlike=clock.unlike,
-        deviations=clock.deviations if finely else None,
-        q=positions[kept].astype(np.longdouble),
-        v=moving[kept].astype(np.longdouble) / unit,
-        q_quantum=q_storage.quantum(positions[kept]),
-        v_quantum=quantum[kept],
-        q_storage=q_storage,
-        v_storage=v_storage,
-        mass=masses,
-        momenta=v is None and masses is None,
-    )
+        found = storage(text if np.all(np.abs(text - made) <= 2 * np.spacing(np.abs(made))) else made)
+        return found, found.quantum(moving / unit)
+    return found, found.quantum(moving) / unit
 
 
-def stated(
-    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
-) -> tuple[Floats | None, int | None, list[str]]:
-    """Stated stiffness (n,), and steps between frames by the stated step: -1, and a note, where it does not
-    divide the interval.  Raises IdentificationError."""
-    stiff = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
-    of_size("friction", friction, zero=True)
+def _alive(positions: Floats, moving: Floats) -> int:
+    """Number of frames before a decaying motion underflows in products of single precision."""
+    alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
+    last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
+    return last + 1 if last + 1 >= FEWEST_STATES else len(positions)
+
+
+def strides_of(record: Record, step: float | None) -> tuple[int | None, list[str]]:
+    """Steps between frames by the stated step: -1, and a note, where it does not divide the interval.  Raises
+    IdentificationError."""
     if step is None:
-        return stiff, None, []
+        return None, []
     of_size("step", step)
     ratio = float(record.interval / np.longdouble(step))
     stride = round(ratio)
-    if 4 * stride * (record.jitter + ROUNDING) >= 0.5:
+    room = 4 * max(stride, 1) * (record.jitter + ROUNDING)
+    if room >= 0.5:
         raise IdentificationError(
-            f"--step {step:g}: {ratio:.3g} of them to a frame are more than the times can tell from one more"
+            f"--step {step:g}: the time stamps are too coarse to fix the number of steps per frame "
+            f"(about {ratio:.3g})"
         )
-    if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
+    if stride < 1 or abs(ratio - stride) > room:
         interval = float(record.interval)
-        note = f"the stated step {step:.9g} does not divide the states' interval {interval:.9g}"
-        return stiff, -1, [note]
-    return stiff, stride, []
+        return -1, [f"the stated step {step:.9g} does not divide the states' interval {interval:.9g}"]
+    return stride, []

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from springcheck.text.wording import count
+
 if TYPE_CHECKING:
-    from springcheck.identify.hypothesis import Match
     from springcheck.text.lines import Lines
 
 Verdict: TypeAlias = Literal["named", "not told apart", "none", "adaptive"]
+UNTOLD = "cannot tell"
+"""Precision if none is identified."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,34 +38,30 @@ class Candidate:
     """Discretisation and place of the friction that the numbers assume; "" without friction."""
 
     def __str__(self) -> str:
-        return self.scheme if self.stride == 1 else f"{self.scheme}, {self.stride} steps a frame"
+        return f"{self.scheme}, {count(self.stride, 'step')} per frame"
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """A possible cause, as a sentence, and what to do about it."""
+    """A possible cause, as a sentence, and what to do about it; "" where nothing is known."""
 
     cause: str
-    remedy: str
+    remedy: str = ""
     misfit: float = 0.0
-    """Residual that the cause leaves: of a map in standard errors, else relative to the residuals that it
-    explains, or to the state if it explains none."""
-    local: bool = field(default=False, kw_only=True)
-    """Whether it leaves no noise to explain: misplaced numbers, or residuals that are only rounding."""
-    shown: bool = field(default=True, kw_only=True)
+    """What it leaves over, relative to the state."""
+    local: bool = False
+    """Whether it leaves no noise to explain: it accounts for every frame to rounding."""
+    shown: bool = True
     """Whether the states show it: else it says why they show none."""
-    hypothesis: Match | None = field(default=None, kw_only=True, repr=False)
-    """The fit of the one scheme that it names, whose numbers the states have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identification:
     """Result of an identification.  Rows of numbers hold one for each oscillator that moves.
 
-    A scheme is named only where the states exclude every other.  Where several explain them equally well
-    the verdict is "not told apart", `scheme` is None, `candidates` are all of them, and a number is given
-    only if it is the same for all.  Where none does it is "none": an adaptive solver, or something unknown;
-    and "adaptive" where one of our own stores says so, and there was nothing to find.
+    A scheme is named only where the states exclude every other.  Where several explain them equally well the
+    verdict is "not told apart", `scheme` is None, `candidates` are all of them, and a number is given only if
+    it is the same for all.  Where none does it is "none"; and "adaptive" where one of our own stores says so.
     """
 
     verdict: Verdict
@@ -72,37 +71,35 @@ class Identification:
     aliases: tuple[str, ...] = ()
     """Other schemes of the same map, which no states on a spring tell apart."""
     candidates: tuple[Candidate, ...] = ()
-    """Schemes that the states do not exclude, the simplest first; one if scheme and stride are certain."""
+    """Schemes that the states do not exclude, the simplest first."""
     step: float = math.nan
     """[T]; negative where time runs backwards, NaN where candidates differ."""
     stride: int | None = None
     """Steps from frame to frame; None where candidates differ."""
-    omega: tuple[float, ...]
+    omega: tuple[float, ...] = ()
     """sqrt(k/m) [1/T], not the frequency of the discrete motion; NaN for an inverted spring."""
     stiffness: tuple[float, ...] | None = None
     """[M/T2]; None where no mass is known."""
-    friction: tuple[float, ...]
+    friction: tuple[float, ...] = ()
     """Rate c/m [1/T]."""
     velocity_offset: float = math.nan
     """Time of the velocities minus that of the positions, in steps."""
-    determinant: tuple[float, ...]
+    determinant: tuple[float, ...] = ()
     """Determinant of the measured map, for one step."""
     symplectic_defect: float = math.nan
     """Largest |M^T J M - J| of the measured map between frames."""
     defect_ulp: float = math.nan
-    """Largest difference of a recorded step from the scheme's, in units of 2**-52 of the sum of its terms; of
-    several schemes, the smallest."""
+    """Largest difference of a recorded frame from that of the scheme, in units of 2**-52 of the state."""
     precision: str = "unknown"
     fits: bool = False
     """Whether a known scheme and arithmetic explain every step, and all that is stated agrees."""
     undecided: bool = False
-    """Whether the scheme is known, but errors of its force may be those of an arithmetic, noise, or
-    systematic. `fits` is False then."""
+    """Whether the scheme is known, but not the arithmetic or the noise.  `fits` is False then."""
     nearest: str | None = None
     """The scheme, or if none fits that of the closest map; None if several fit."""
     difference: tuple[float, ...] = (math.nan,) * 4
     """Measured minus predicted M11, M12, M21, M22 on (q, v T) between frames, of the first oscillator."""
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     explanations: tuple[Explanation, ...] = ()
     """Causes if no scheme fits, or what is stated does not, the likeliest first."""
 
@@ -115,25 +112,18 @@ class Identification:
 
     @property
     def choice(self) -> list[str]:
-        """Schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame"."""
+        """Schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps per frame"."""
         strides: dict[str, set[int]] = {}
         for x in self.candidates:
             strides.setdefault(x.scheme, set()).add(x.stride)
         return [
-            name if often == {1} else f"{name}, {_ranges(sorted(often))} steps a frame"
-            for name, often in strides.items()
+            name if found == {1} else f"{name}, {_ranges(sorted(found))} steps per frame"
+            for name, found in strides.items()
         ]
 
     def noting(self, *more: str) -> Identification:
         """Copy with further remarks."""
         return replace(self, notes=(*self.notes, *more))
-
-    def doubted(self, statement: str, *more: str, because: tuple[Explanation, ...] = ()) -> Identification:
-        """Copy that names none of its candidates, since something else may have made the states."""
-        return replace(
-            self.noting(*more), verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
-            statement=statement, explanations=because,
-        )  # fmt: skip
 
     def refuted(self, statement: str, *because: Explanation) -> Identification:
         """Copy without candidates, since something else made the states."""
@@ -148,23 +138,11 @@ class Identification:
         return dict(_plain(asdict(self)))
 
 
-def nothing(
-    explanations: tuple[Explanation, ...],
-    *,
-    determinant: tuple[float, ...],
-    symplectic_defect: float = math.nan,
-    defect_ulp: float = math.nan,
-    notes: Sequence[str],
-    **near: Any,
-) -> Identification:
-    """Identification without a scheme, and why.  `determinant` has one value for each moving oscillator;
-    `near` holds what is known of the nearest scheme."""
-    unknown = (math.nan,) * len(determinant)
-    return Identification(
-        verdict="none", statement=explanations[0].cause, friction=unknown, determinant=determinant,
-        symplectic_defect=symplectic_defect, defect_ulp=defect_ulp, notes=tuple(dict.fromkeys(notes)),
-        explanations=explanations, **{"omega": unknown, **near},
-    )  # fmt: skip
+def nothing(because: Sequence[Explanation], n: int = 1, **known: Any) -> Identification:
+    """Identification of n oscillators without a scheme, and why."""
+    unknown = (math.nan,) * n
+    fields: dict[str, Any] = {"omega": unknown, "friction": unknown, "determinant": unknown, **known}
+    return Identification(verdict="none", statement=because[0].cause, explanations=tuple(because), **fields)
 
 
 def _ranges(strides: list[int]) -> str:
@@ -179,7 +157,7 @@ SCALARS = ("omega", "stiffness", "friction", "determinant")
 
 def _plain(x: Any, name: str = "") -> Any:
     if isinstance(x, dict):
-        return {key: _plain(value, key) for key, value in x.items() if key != "hypothesis"}
+        return {key: _plain(value, key) for key, value in x.items()}
     if isinstance(x, float):
         return x if math.isfinite(x) else None
     if isinstance(x, tuple | list):
@@ -187,73 +165,52 @@ def _plain(x: Any, name: str = "") -> Any:
     return x
 
 
-UNTOLD = "cannot tell"
-"""Precision if none is identified."""
-
-
-def rounded_by(precision: str) -> str:
-    """Cause of the rounding at a precision, as a phrase: double arithmetic, rounding to 6 digits."""
-    kind, comma, stored = precision.partition(", ")
-    if kind == "text":
-        return f"rounding to {precision.replace('text, ', '')}"
-    return "rounding" if precision == UNTOLD else f"{kind} arithmetic{comma}{stored}{comma.strip()}"
-
-
-OR_UNKNOWN = "; or a scheme that is not known here"
-ONLY_TURNS = "The velocity of coordinates "
-"""Beginning of a statement on a rotation of the velocity."""
-
-IDENTIFIED = {
+HEADS = {
     "not told apart": "several schemes, which the data cannot tell apart",
     "adaptive": "adaptive solver, no fixed scheme to find",
 }
 """Phrases of the report for verdicts that name no scheme."""
 
 
+def headline(found: Identification) -> str:
+    """The answer in one line: the name and the steps per frame, or the cause."""
+    if found.explanations:
+        return found.explanations[0].cause
+    unsure = ", or a scheme that is not known here" if "not known here" in found.statement else ""
+    if found.scheme is None:
+        return HEADS[found.verdict] + unsure if found.verdict in HEADS else found.statement
+    often = "" if found.stride is None else f", {count(found.stride, 'step')} per frame"
+    misfit = "" if found.fits else ", but whether it fits cannot be judged"
+    return f"{found.scheme}{often}{unsure}{misfit}"
+
+
 def identification(label: str, found: Identification) -> Lines:
-    """Format an identification as text."""
+    """Format an identification as text: the answer, what to do, numbers, notes."""
     from springcheck.text.lines import hanging, plain
 
     style = "bold" if found.fits or found.verdict == "adaptive" else "bold red"
-    recorded = "" if found.stride in (None, 1) else f", {found.stride} steps from frame to frame"
     several = found.candidates if len(found.candidates) > 1 else ()
+    lines = textwrap.wrap(f"{label}: {headline(found)}", 80, subsequent_indent="  ", break_on_hyphens=False)
+    out: Lines = [plain(line, style) for line in lines]
+    for one in found.explanations[:1]:
+        out += hanging("  what to do: ", one.remedy) if one.remedy else []
+    for one in found.explanations[1:3]:
+        out += hanging("  or: ", f"{one.cause}{f'; {one.remedy}' if one.remedy else ''}")
+    if several and found.choice != [found.scheme]:
+        out += hanging("  one of: ", "; ".join(found.choice))
     rows = [
         ("same map on a spring", ", ".join(found.aliases)),
         ("friction law", found.candidates[0].law if len(found.candidates) == 1 else ""),
-        ("step", f"{found.step:.9g}{recorded}"),
+        ("step", f"{found.step:.9g}"),
         ("angular frequency", _numbers(found.omega, [x.omega for x in several])),
         ("stiffness", _numbers(found.stiffness, [x.stiffness or () for x in several])),
-        ("velocities", _offset(found.velocity_offset)),
         ("determinant of a step", _numbers(found.determinant, ())),
-        ("symplectic defect", f"{found.symplectic_defect:.1e}"),
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
-    unfit = found.candidates and not (found.fits or found.undecided)
-    misfit = ", but what is stated does not fit" if unfit else ""
-    if found.undecided and found.scheme:
-        misfit = ", but whether it fits cannot be judged"
-    said = IDENTIFIED.get(found.verdict, found.scheme)
-    if found.verdict == "not told apart" and (not several or found.statement.startswith(ONLY_TURNS)):
-        # one is left, which is not enough to be named, or none may be right
-        said = found.statement
-    elif found.statement.endswith(OR_UNKNOWN):
-        misfit += OR_UNKNOWN
-    if found.explanations:
-        # the diagnosis is the headline, and what to do stands below it
-        said, misfit = found.explanations[0].cause, ""
-    first = textwrap.wrap(f"{label}: {said}{misfit}", 80, subsequent_indent="  ", break_on_hyphens=False)
-    out: Lines = [plain(line, style) for line in first]
-    for one in found.explanations[:1]:
-        out += hanging("  what to do: ", one.remedy)
-    for one in found.explanations[1:3]:
-        out += hanging("  or: ", f"{one.cause}; {one.remedy}")
-    if several and found.choice != [found.scheme]:
-        out += hanging("  one of: ", "; ".join(found.choice))
     for name, text in rows:
         if text and "nan" not in text:
             out += hanging(f"  {name + ':':24}", text)
-    notes = [found.statement, *found.notes] if found.undecided and said != found.statement else found.notes
-    for note in notes:
+    for note in found.notes:
         out += hanging("  note: ", note)
     return out
 
@@ -267,9 +224,3 @@ def _numbers(values: tuple[float, ...] | None, several: Sequence[tuple[float, ..
         return ""
     text = ", ".join(f"{x:.12g}" for x in values[:3])
     return text + (f" ... ({len(values)} oscillators)" if len(values) > 3 else "")
-
-
-def _offset(steps: float) -> str:
-    if steps == 0:
-        return "synchronised with the positions"
-    return f"{abs(steps):g} of a step {'early' if steps < 0 else 'late'}"

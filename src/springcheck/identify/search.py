@@ -1,329 +1,293 @@
-"""The search: hypotheses in order of simplicity, those that the states do not exclude, and of these those
-whose every step a known arithmetic explains."""
+"""The rounds of hypotheses in order of simplicity, and what is left of them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
-from typing import TypeAlias
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from springcheck.identify.arithmetic import SINGLE, Defect, defects
-from springcheck.identify.coarse import over_single
-from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import FIXED, Measured
-from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, HELD, KNOWN_ELSEWHERE, Family
-from springcheck.identify.fit import Map, fit
-from springcheck.identify.guesses import roots_of
-from springcheck.identify.hypothesis import EXCLUDED, FEW, MANY, STRIDES, Joint, Terms, distinct, likely
-from springcheck.identify.interrupted import remembered
-from springcheck.identify.maps import unit
+from springcheck.identify.arithmetic import arithmetic
+from springcheck.identify.catalogue import distinct
+from springcheck.identify.compare import SINGLE, Freedom, Joint, compare, likely
+from springcheck.identify.measure import Map
 from springcheck.identify.record import Record
+from springcheck.identify.repairs import turned
+from springcheck.identify.rows import Row
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats
 
-BIAS = 3.0
-"""Bias of an entry by truncated forces, in units of the residual.  Truncation has a mean of half an ulp and a
-standard deviation of 0.29; the rest is for roundings that recur with the motion."""
-
-POOR = 8.0
-"""Chi-squared of three degrees of freedom that is exceeded with a probability of 5 %."""
-
-ONE_MORE = 4.0
-"""Decrease of chi-squared by one more unknown that is exceeded with a probability of 5 %."""
-
-LEAST_OF_SINGLE = 2.0**-27
-"""Least residual, relative to the state, of states that are computed in single precision: one rounding has a
-root mean square of 2**-24.8 to 2**-25.8 of a number, and most numbers are below the size of the state."""
-
-PLAIN = 30.0
-"""Distance of the exact solution's map, in residuals, from which a scheme's truncation error is visible."""
-
-AS_NEAR = 1.5
-"""Ratio of residuals up to which the arithmetic of one scheme explains those of another."""
-
-SAME_MAP = 1e-12
-"""Largest difference of the entries of equal maps in double precision."""
-
-Explained: TypeAlias = dict[Joint, list[Defect]]
-"""Hypotheses, the simplest first, with the defect of each oscillator, which a known arithmetic explains."""
+FEW, MANY = range(1, 13), range(13, 101)
+WIDTHS = float, np.float32
 
 
-@cache
-def coincident(name: str) -> tuple[str, ...]:
-    """Damped families with the undamped map of this scheme, on springs of another stiffness."""
-    wanted = np.asarray(unit(FAMILIES[name], np.array([0.3, 0.7, 1.1]), np.zeros(3)), np.float64)
-    if not np.all(np.log(np.abs(np.linalg.det(wanted))) < -1e-9):
-        return ()
-    every = distinct(damped=True)
-    which, root, _, g = roots_of(every, wanted, SAME_MAP)
-    good = {(i, j) for i, j, x in zip(which.tolist(), root.tolist(), g.tolist(), strict=True) if x > 1e-6}
-    return tuple(f.name for i, f in enumerate(every) if all((i, j) in good for j in range(3)))
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """Hypotheses that are equally simple: a group of rows, steps to a frame, and what is left open."""
+
+    group: str
+    strides: range = FEW
+    scale: bool = False
+    growing: bool = False
+    only_stated: bool = False
+    """Whether a stated stiffness has to agree: on any spring many maps are another scheme's."""
+    fine_only: bool = False
+    single: bool = False
+    """Whether the step may be rounded to single precision, and the times not."""
 
 
-def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
-    """Whether two hypotheses have the same one-step maps, so that no number of digits tells them apart."""
-    if one.stride != other.stride:
-        return False
-    both = FAMILIES[one.family], FAMILIES[other.family]
-    wanted = np.concatenate(
-        [unit(both[0], np.array([x.a]), np.array([x.g])).astype(np.float64) for x in one.parts]
-    )
-    roots = roots_of(both[1:], wanted, SAME_MAP, free_scale=free_scale)[1]
-    return len(set(roots.tolist())) == len(wanted)
+ROUNDS = (
+    Round(group="plain"), Round(group="friction"), Round(group="held"), Round(group="elsewhere"),
+    Round(group="faults", strides=range(1, 5)), Round(group="damped elsewhere", strides=range(1, 5)),
+    Round(group="plain", strides=MANY),
+    Round(group="plain", single=True, fine_only=True),
+    Round(group="friction", strides=range(13, 33), fine_only=True),
+    Round(group="recorded", strides=range(1, 3)),
+    Round(group="unequal", strides=range(1, 2), fine_only=True, only_stated=True),
+    Round(group="wrong sign", strides=range(1, 3), only_stated=True),
+    Round(group="parameters", strides=range(1, 2), fine_only=True),
+    Round(group="friction", strides=range(1, 3), growing=True),
+    Round(group="plain", strides=range(1, 4), scale=True),
+    Round(group="elsewhere", strides=range(1, 2), scale=True),
+)  # fmt: skip
+"""The simplest first."""
+
+WEAK = "damped elsewhere"
+"""The group of two free numbers and many stages that fits some map on some spring by chance."""
+
+STAND_TOGETHER = 4
+"""Rounds whose hypotheses stand beside each other in files of few digits."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
-    """One round of the search: families, tolerances beside standard errors, and ranges of strides."""
+@dataclass(eq=False, kw_only=True)
+class Seen:
+    """A record, its maps, and what is stated."""
 
-    damped: bool = False
-    rounding: float = ROUNDING
-    bias: float = 0.0
-    strides: tuple[range, ...] = (FEW,)
+    record: Record
+    moving: list[int]
+    maps: list[Map]
+    stiffness: Floats | None
+    friction: float | None
+    stride: int | None
+    notes: list[str] = field(default_factory=list)
+    marked: list[Joint] = field(default_factory=list)
+    """Hypotheses whose friction is the mark of a step that is written down wrongly."""
 
     @property
-    def families(self) -> tuple[Family, ...]:
-        return (*distinct(damped=True), HELD) if self.damped else distinct(damped=False)
+    def told(self) -> bool:
+        """Whether a stiffness or a friction is stated that states can be held against."""
+        known = self.stiffness is not None or self.friction is not None
+        return known and self.record.mass is not None
 
+    def ratio(self, x: Joint, i: int = 0) -> float:
+        """Stiffness of an oscillator over the stated one; NaN where none is stated."""
+        j, m = self.moving[i], self.record.mass
+        if self.stiffness is None or m is None or not self.stiffness[j]:
+            return math.nan
+        return x.parts[i].a * x.stride**2 / float(self.stiffness[j] / m[j] * self.record.interval**2)
 
-def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
-    """The data as fitted, the hypotheses whose every step a known arithmetic explains, and whether any
-    hypothesis fits, explained or not.
-
-    In turn: the schemes of the catalogue, in coarse files also with a fitted equilibrium; Verlet with another
-    first step; schemes of the stated stiffness; schemes elsewhere; step or mass in single precision.
-    """
-    fine = seen.record.fine
-    joints, wide = find(seen)
-    way, found, fitting = seen, explained(wide, joints), bool(joints)
-    apart = seen
-    if not (fine or any(_agrees(seen, x) for x in found)):
-        # an equilibrium beside 0 that a short or coarse file does not show may still be there
-        each = zip(seen.moving, seen.maps, strict=True)
-        apart = replace(
-            seen, maps=[x if np.any(x.centre) else fit(seen.record, j, constant=True) for j, x in each]
-        )
-    if not (found or fine):
-        joints, wide = find(apart)
-        found = explained(wide, joints)
-        way = apart if found else seen
-    if not found:
-        later, joints = remembered(seen)
-        if found := explained(later, joints):
-            way = later.noting(
-                "the first step has the friction of the first velocity: none is half a step old"
-            )
-    if found and seen.stiffness is not None and not (fine or any(_agrees(way, x) for x in found)):
-        # friction, or an equilibrium beside 0, is as simple as another spring than the stated one
-        ways = ((x, damped) for x in (way, apart) for damped in (False, True))
-        for other, damped in ways:
-            of_stated = (x for x in other.compare(distinct(damped=damped), FEW) if _agrees(other, x))
-            if more := explained(other, likely(list(of_stated))):
-                way, found = other, more
-                break
-    found = _or_elsewhere(way, found)
-    if not _of_few_steps(found):
-        # few steps, one of them rounded, are simpler than many
-        joints, remark = _single_parameters(way)
-        if rounded := explained(way, joints):
-            way, found = way.noting(remark), rounded
-    return way, found, fitting
-
-
-def _agrees(seen: Measured, x: Joint) -> bool:
-    """Whether a hypothesis has the stated step and stiffness."""
-    return seen.stride in (None, x.stride) and (seen.stiffness is None or not seen.disagreements(x))
-
-
-def _of_few_steps(found: Explained) -> bool:
-    return any(x.stride in FEW for x in found)
-
-
-def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
-    """The hypotheses found, and the schemes that springcheck does not run and the states do not exclude."""
-
-    def elsewhere(strides: range) -> Explained:
-        joints = seen.compare(KNOWN_ELSEWHERE, strides) or seen.compare(DAMPED_ELSEWHERE, strides)
-        return explained(seen, likely(joints))
-
-    if not _of_few_steps(found):
-        # few steps of a scheme elsewhere are simpler than many of one in the catalogue
-        return {**elsewhere(FEW), **found}
-    if seen.stride is not None or seen.stiffness is not None:
-        right = {x.scheme for x in found if _agrees(seen, x)}
-        if right and (seen.record.fine or (seen.stride is None and len(right - {"exact"}) == 1)):
-            return found
-        # agreement with what is stated counts more than a simple scheme
-        others = elsewhere(FEW if seen.stride is None else range(seen.stride, seen.stride + 1))
-        others = {x: ds for x, ds in others.items() if _agrees(seen, x)}
-        return {**(found if right or not others else {}), **others}
-    if seen.record.fine:
-        return found
-    # coarse numbers that leave several schemes leave schemes elsewhere too
-    alone = len({(x.scheme, x.stride) for x in found}) == 1
-    strides = range(1, min(x.stride for x in found)) if alone else FEW
-    others = {**found, **(elsewhere(strides) if strides else {})}
-    return {x: others[x] for x in likely(list(others))}
-
-
-def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
-    """Schemes that fit if step, mass or both were rounded to single precision, and a note on which."""
-    record, stride = seen.record, seen.stride
-    if record.momenta or record.vague:
-        return [], ""
-    masses = [1.0 if record.mass is None else float(record.mass[j]) for j in seen.moving]
-    heavier = [_shortened(m) for m in masses]
-    strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
-    longer = [0.0, *(_shortened(record.interval / s) for s in range(1, strides.stop))]
-    for families in (distinct(damped=False), (*distinct(damped=True), HELD)):
-        for what, of_mass, of_step in (("step", 0, 1), ("mass", 1, 0), ("step and the mass", 1, 1)):
-            scales = [tuple(of_mass * m - of_step * h for h in longer) for m in heavier]
-            if not any(any(row[1:]) for row in scales):
+    def off(self, x: Joint) -> float:
+        """Relative distance of a hypothesis' springs from the stated ones, beyond errors; 0 of none."""
+        if self.stiffness is None or self.record.mass is None:
+            return 0.0
+        out, fine = 0.0, self.record.fine
+        for j, part in zip(self.moving, x.parts, strict=True):
+            k, m, h = self.stiffness[j], self.record.mass[j], float(self.record.interval) / x.stride
+            if not k:
                 continue
-            loose = [replace(x, scales=row) for x, row in zip(seen.terms, scales, strict=True)]
-            if joints := replace(seen, terms=loose).compare(families, strides):
-                return joints, f"the {what} was rounded to single precision in double arithmetic"
-    return [], ""
+            room = 6 * part.a_error / abs(part.a) + 4 * self.record.jitter
+            room += 1e-10 if fine else 1e-7 + 8 * SINGLE
+            # any of the numbers may have been rounded to single precision
+            ways = ((float(x(k)), float(y(m)), float(z(h))) for x in WIDTHS for y in WIDTHS for z in WIDTHS)
+            out = max(out, min(abs(part.a / (y / z * w * w) - 1) for y, z, w in ways if y) - room)
+        return out
+
+    def rubs(self, x: Joint) -> float:
+        """Relative distance of a hypothesis' friction from the stated one, beyond errors; 0 of none."""
+        if self.friction is None or self.record.mass is None:
+            return 0.0
+        out = 0.0
+        for j, part in zip(self.moving, x.parts, strict=True):
+            h = abs(float(self.record.interval)) / x.stride
+            wanted, error = self.friction / float(self.record.mass[j]) * h, 0.0
+            g = 0.0
+            if x.row.damped:
+                g, error = part.g, 8 * part.g_error
+            # friction may be implicit in v, a factor, or exponential: three rates of one map
+            ways = (g, math.expm1(min(g, 50.0)), -math.expm1(-g)) if x.row.damped else (g,)
+            room = error + (1e-9 + 8 * self.record.jitter) * wanted + 1e-13
+            out = max(out, (min(abs(y - wanted) for y in ways) - room) / max(wanted, g, 1e-300))
+        return out
+
+    def agrees(self, x: Joint) -> bool:
+        return self.off(x) <= 0 and self.rubs(x) <= 0 and self.stride in (None, x.stride)
 
 
-def _shortened(x: np.longdouble | float) -> float:
-    """Log of the ratio of a number in single precision to the number."""
-    return -float(np.log(over_single(x)))
+def chosen(x: Joint) -> bool:
+    """Whether a parameter is a number that somebody would choose."""
+    ok = True
+    for part in x.parts:
+        room = 12 * part.g_error + 1e-9
+        if x.row.free == "share":
+            off = abs(2 * part.g - 1)
+            n = 1 / off if off > 1 / 64 - room else math.inf
+            whole = abs(off - 1 / round(n)) <= 2 * room if n < 1e3 and round(n) else False
+            ok = ok and n < 1e3 and 2 <= round(n) <= 64 and whole
+        elif x.row.free in ("theta", "beta"):
+            near = abs(part.g * 1200 - round(part.g * 1200)) < 1200 * max(room, 1e-7)
+            ok = ok and 1e-3 < part.g <= 1 and near and room < 1e-4
+    return ok
 
 
-def find(seen: Measured) -> tuple[list[Joint], Measured]:
-    """Hypotheses that the states do not exclude, the simplest first, and the data with the terms on which
-    they fit.  The first round of `_plan` with a fit ends the search."""
-    fine, stride = seen.record.fine, seen.stride
-    first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
-    for trials in _plan(seen):
-        accepted: list[Joint] = []
-        for trial in trials:
-            terms = [replace(what, rounding=trial.rounding, bias=trial.bias) for what in seen.terms]
-            wide = replace(seen, terms=terms)
-            for strides in (*first, *trial.strides):
-                fitting = wide.compare(trial.families, strides)
-                if fitting:
-                    accepted += fitting
-                    if strides is FEW and (MANY in trial.strides or not trial.bias):
-                        accepted += _further(wide, fitting, trial)
-                    if not (fine or trial.damped):
-                        accepted += _rivals(wide, fitting, many=strides is MANY)
-                    break
-        if accepted:
-            return likely(accepted), wide
-    return [], seen
+def beyond(m: Map, fine: bool) -> bool:
+    """Whether what one map leaves over is more than any arithmetic does."""
+    if fine:
+        return float(np.max(np.abs(m.left) / m.unit[:, None])) > 1e6
+    w = 1 / np.hypot(m.unit / ROUNDING, np.max(m.noise[1:], 1))[:, None]
+    noisy = float(np.sqrt(np.mean(m.left**2))) > 30 * float(np.sqrt(np.mean(m.noise**2)))
+    return float(np.sqrt(np.mean((m.left * w) ** 2))) > 1e-4 and noisy
 
 
-def explained(seen: Measured, accepted: list[Joint]) -> Explained:
-    """The hypotheses of which a known arithmetic explains every step, with the defects of their steps."""
-    left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
-    of_each: list[list[Defect]] = [[] for _ in left]
-    for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
-        if not left:
-            break
-        shows = cache(partial(_stands_out, seen, accepted, found, what, damped=left[0].damped))
-        new = defects(seen.record, j, found, [x.parts[i] for x in left], shows)
-        # what explains one scheme's residuals does not exclude others of no larger residuals
-        good = [x for x in new if x.precision]
-        new = [
-            next((y for y in good if x.miss <= AS_NEAR * y.miss), x) if not x.precision else x for x in new
-        ]
-        kept = [k for k, x in enumerate(new) if x.precision]
-        of_each = [[*of_each[k], new[k]] for k in kept]
-        left = [left[k] for k in kept]
-    return dict(zip(left, of_each, strict=True))
-
-
-def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether all fitting hypotheses have one map, and the truncation error of its scheme is visible."""
-    one, free_scale = accepted[0], terms.mass_unknown or terms.vague
-    alone = all(
-        (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=free_scale)
-        for x in accepted
+def marked(x: Joint) -> bool:
+    """Whether the friction is a multiple of h k/m, the mark of a step that is written down wrongly."""
+    return any(
+        abs(n * lost / part.a - 1) < 1e-9 + 6 * part.g_error / part.g
+        for part in x.parts
+        for lost in (part.g, -math.expm1(-min(part.g, 50.0)), math.expm1(min(part.g, 50.0)))
+        for n in (1, 2, 3, 4, 0.5)
     )
-    return alone and visible(found, terms, damped=damped)
 
 
-def _plan(seen: Measured) -> list[list[Trial]]:
-    """Rounds of the search, the simplest first; those of one list are equally simple.
+MOST_EXCESS = 1000.0
+"""Largest residual of one map of states in double precision, in units of rounding, that a name may have."""
 
-    Undamped before damped.  Coefficients are rounded in double precision, unless the states show a coarser
-    arithmetic or are too few to exclude it; text does not show it, so that single precision is as simple as
-    friction there.  A bias of the size of the residuals comes last: one orbit, rounded once, has none. Coarse
-    numbers admit few steps of other schemes, so that many steps are tried before a wider tolerance; with a
-    bias too many would fit.
-    """
-    record, whole = seen.record, all(found.whole for found in seen.maps)
-    residual = max(float(np.max(found.residual)) for found in seen.maps)
-    biased = [BIAS] if residual > FIXED and not whole else []
-    if record.fine:
-        trials = [[Trial(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
-        return [*trials, [Trial(strides=(MANY,))]]
-    near = (FEW, MANY)
-    double, double_damped, single, single_damped = (
-        Trial(damped=damped, rounding=rounding, strides=near)
-        for rounding in (ROUNDING, SINGLE)
-        for damped in (False, True)
+Found = list[tuple[Joint, str]]
+"""Hypotheses with the arithmetic that explains each."""
+
+
+def _exceeds(seen: Seen, stride: int) -> bool:
+    """Whether one map leaves over more than roundings of so many steps."""
+    most = MOST_EXCESS * math.sqrt(stride) + 10 * seen.record.clock / ROUNDING
+    return seen.record.fine and max(m.excess for m in seen.maps) > most
+
+
+def explained(seen: Seen, x: Joint) -> str:
+    """The arithmetic by which every frame of every oscillator follows; "" where one does not."""
+    if _exceeds(seen, x.stride):
+        return ""
+    found = [arithmetic(seen.record, m, part) for m, part in zip(seen.maps, x.parts, strict=True)]
+    return " and ".join(dict.fromkeys(found)) if all(found) else ""
+
+
+def _freedom(seen: Seen, one: Round) -> Freedom:
+    record, fine, momenta = seen.record, seen.record.fine, seen.record.momenta
+    rough = not fine and any(not m.stored for m in seen.maps)
+    vague = (record.vague and not one.scale) or (one.single and not momenta)
+    jitter = max(record.jitter, SINGLE * one.single)
+    return Freedom(
+        jitter=0.0 if vague else record.jitter if fine else math.hypot(record.jitter, SINGLE),
+        scale=one.scale or momenta or vague, prior=jitter * vague,
+        rounding=SINGLE if rough else ROUNDING, growing=one.growing,
+    )  # fmt: skip
+
+
+def _skipped(seen: Seen, one: Round, kept_area: bool) -> bool:
+    """Whether a round has nothing to say of these states."""
+    if _exceeds(seen, one.strides[-1]):
+        return True
+    fine, friction = seen.record.fine, one.group in ("friction", "damped elsewhere")
+    out = (fine and kept_area and friction) or (one.fine_only and not fine)
+    out = out or (one.scale and seen.record.momenta) or (seen.friction == 0 and friction and not one.growing)
+    out = out or (one.only_stated and seen.stiffness is None)
+    out = out or (one.scale and turned(seen.record, seen.moving) is not None)
+    # of a stated number of steps
+    many = seen.stride is not None and one.strides.start > FEW[-1] and seen.stride not in one.strides
+    return (
+        out or many or (seen.stride is not None and one.strides is not FEW and seen.stride not in one.strides)
     )
-    coarse = residual > LEAST_OF_SINGLE and not record.deep
-    out: list[list[Trial]] = []
-    if whole or not coarse:
-        out += [[double], [double_damped, single] if record.text and coarse else [double_damped]]
-    if coarse:
-        out += [[single], [single_damped]]
-    return out + [
-        [Trial(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
-    ]
 
 
-def _further(seen: Measured, accepted: list[Joint], trial: Trial) -> list[Joint]:
-    """Further hypotheses that the states do not exclude, beside those accepted of few steps to a frame.
-
-    The truncation error falls with the number of steps, so that larger numbers may fit too; where the exact
-    solution fits, so does any scheme of enough steps.  In double precision many steps are tried only where
-    few leave a choice.  Friction may be there without being significant.
-    """
-    out: list[Joint] = []
-    open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
-    if open_ended or not (seen.record.fine or trial.damped):
-        out += seen.compare(trial.families, MANY)
-    if not trial.damped and min(x.chi2 for x in accepted) > EXCLUDED:
-        out += seen.compare(distinct(damped=True), FEW)
-    return out
-
-
-def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
-    """Rival hypotheses in coarse files: a force held over substeps resembles many steps, and friction may
-    explain a loss of area.  A family that contains a fitting scheme's map must fit better than it."""
-    losing = many or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
-    others = distinct(damped=True) if losing else ()
-    same = {name: x.chi2 for x in fitting for name in coincident(x.family)}
-    found = seen.compare((*others, HELD), FEW)
-    return [x for x in found if x.chi2 < same.get(x.family, math.inf) - ONE_MORE]
-
-
-@lru_cache(maxsize=64)
-def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether the truncation error of a step is far above the residuals.
-
-    The map of an adaptive solver differs from the exact one by the scatter of its steps, within which many
-    schemes of many small steps fit; coarse arithmetic does not bring a map nearer to the exact one.
-    """
-    flow = FAMILIES["exact, damped" if damped else "exact"]
-    near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
-    return all(m.chi2 > PLAIN**2 for m in near)
+def _compared(seen: Seen, one: Round, kept: Found) -> list[Joint]:
+    fine, free = seen.record.fine, _freedom(seen, one)
+    stated = seen.stride is not None and seen.stride >= 1
+    strides: Iterable[int] = [seen.stride] if stated and seen.stride else one.strides
+    parts: list[Iterable[int]] = [strides]
+    if fine and one.group == "friction" and one.strides is FEW and not stated:
+        parts = [FEW[:4], FEW[4:]]
+    joints: list[Joint] = []
+    for part in parts:
+        joints = joints or [x for x in compare(seen.maps, free, distinct(one.group), part) if chosen(x)]
+    if one.group == "friction" and not one.growing and seen.friction is None and fine:
+        seen.marked += [x for x in joints if marked(x)]
+        joints = [x for x in joints if not marked(x)]
+    if one.group == "friction" and not one.growing and kept:
+        # friction that is not significant is none
+        joints = [x for x in joints if any(p.g > 5 * p.g_error for p in x.parts)]
+    if one.growing:
+        joints = [x for x in joints if x.parts[0].g < -6 * (x.parts[0].g_error + 1e-13)]
+    if one.scale:
+        least = 1e-9
+        joints = [x for x in joints if abs(x.parts[0].log_scale) > 6 * x.parts[0].scale_error + least]
+    if joints and fine and one.strides.start >= MANY.start:
+        # of many steps near the exact solution some scheme fits by chance
+        exact = [row for row in distinct("plain") if row.scheme == "exact"]
+        flow = compare(seen.maps, free, exact, range(1, 2), far=True)
+        joints = joints if min((x.chi2 for x in flow), default=math.inf) > 900 else []
+    return joints
 
 
-def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
-    """The terms on which the map of oscillator j is compared."""
-    log_stiffness = None
-    if record.momenta and not record.vague and stated is not None and stated[j] > 0:
-        log_stiffness = math.log(stated[j] * float(record.interval) ** 2)
-    # in a coarse file a step or a mass may be in single precision as well
-    jitter = math.hypot(record.jitter, 0.0 if record.deep else SINGLE)
-    vague = record.vague and not record.momenta
-    return Terms(mass_unknown=record.momenta, jitter=jitter, vague=vague, log_stiffness=log_stiffness)
+def search(seen: Seen) -> tuple[Found, Round | None]:
+    """Hypotheses with the arithmetic that explains each, and the round in which they were found."""
+    fine = seen.record.fine
+    if any(beyond(m, fine) for m in seen.maps):
+        return [], None
+    first: tuple[Found, Round | None] = ([], None)
+    weak = first
+    kept: Found = []
+    kept_area = all(abs(_area(m) - 1) < 1e-12 for m in seen.maps)
+    for i, one in enumerate(ROUNDS):
+        if _skipped(seen, one, kept_area):
+            continue
+        joints = _compared(seen, one, kept)
+        good = [(x, a) for x in likely(joints) if (a := explained(seen, x))]
+        if not good and (fine or i != STAND_TOGETHER - 1 or not kept):
+            continue
+        if not fine and i < STAND_TOGETHER:
+            # few digits: hypotheses of all plain rounds stand beside each other, a number more costs 4
+            kept += good
+            agrees = seen.told and any(seen.agrees(x) for x, _ in kept)
+            if i < STAND_TOGETHER - 1 and not agrees:
+                continue
+            good = kept
+        agreeing = [(x, a) for x, a in good if seen.agrees(x)]
+        if agreeing or not seen.told:
+            return _best(agreeing or good, fine), one
+        if one.group == WEAK:
+            weak = weak if weak[0] else (good, one)
+        elif not first[0]:
+            first = good, one
+    first = first if first[0] or seen.told else weak
+    if kept and not first[0]:
+        first = kept, ROUNDS[0]
+    return _best(first[0], fine), first[1]
+
+
+def _area(m: Map) -> float:
+    return float(m.b[0, 0] * m.b[1, 1] - m.b[0, 1] * m.b[1, 0])
+
+
+def _best(good: Found, fine: bool) -> Found:
+    cost = {id(x): x.chi2 + 4 * len(x.parts) * bool(x.row.free) * (not fine) for x, _ in good}
+    low = min(cost.values(), default=0.0)
+    return sorted(((x, a) for x, a in good if cost[id(x)] <= low + 25), key=lambda y: y[0].simple)
+
+
+def without_constant(seen: Seen, maps: list[Map]) -> Seen:
+    """The same with other maps."""
+    return replace(seen, maps=maps)
+
+
+def of_group(group: str) -> tuple[Row, ...]:
+    """The rows of a group, one for each map."""
+    return distinct(group)

@@ -10,13 +10,13 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError, told
-from springcheck.identify.families import title
+from springcheck.identify.catalogue import FAULTS, of_scheme, title
 from springcheck.identify.pair import Timeless, on_a_pair, returned
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
-from springcheck.identify.taken import takers
+from springcheck.identify.rows import same
+from springcheck.identify.steps import takers
 from springcheck.identify.unknown import MAP_OF, ONE_MAP
-from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
 from springcheck.physics.exact import true_motion
 from springcheck.physics.scene import Scene
@@ -145,7 +145,7 @@ def identify_stepper(step: Stepper, *, single: bool = False) -> Identification:
         wrong += _backwards(step, found)
     if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
         # more stages than the scheme needs: a fault of the same map has them
-        wrong += [Explanation(one.cause, one.remedy) for one in faults_like(found.scheme)]
+        wrong += [Explanation(one.fault, one.remedy) for one in FAULTS if same(one, of_scheme(found.scheme))]
     slope, deviation = _order(step)
     order = f"order {slope:.2f} +- {deviation:.2f} on a quartic well"
     if math.isnan(slope):

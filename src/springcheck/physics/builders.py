@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import SceneError
-from springcheck.physics import graph, memory
+from springcheck.physics import memory
 from springcheck.physics.arguments import typed
 from springcheck.physics.arrays import Floats, reals
 from springcheck.physics.scene import Scene
@@ -82,7 +82,7 @@ def chain(
         raise SceneError(f"waves = {waves!r}: pairs of a mode and an amplitude are needed") from None
     if not (waves or np.any(q) or np.any(p)):
         waves = [(1, 1.0)]
-    title, q = f"Chain of {masses:,} masses between two walls", q + graph.standing(masses, waves)
+    title, q = f"Chain of {masses:,} masses between two walls", q + standing(masses, waves)
     found = Scene(m=m, q=q, p=p, terms=(walls, links), step=step, steps=steps, name="chain", title=title)
     return found.replace(**rest)
 
@@ -112,6 +112,18 @@ def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:
         # the only mass of a chain is joined to both walls
         walls = WallSpring(i=np.zeros(1, np.int64), k=2 * each[:1], at=np.zeros(1))
     return Spring(a=row, b=row + 1, k=each[1:-1], rest=none), walls
+
+
+def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
+    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses.  Raises SceneError."""
+    q = np.zeros(masses)
+    for mode, amplitude in waves:
+        if mode not in range(1, masses + 1):
+            raise SceneError(f"waves: mode {mode}: a chain of {masses} has modes 1 to {masses}")
+        # whole turns are subtracted while the phase is still an integer multiple of 1/(n + 1) half turns
+        phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
+        q += amplitude * np.sin(np.pi * phase / (masses + 1))
+    return q
 
 
 def _together(where: str, **given: ArrayLike) -> list[Floats]:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.distance import Distances
 from springcheck.physics.term import Term
@@ -33,7 +32,7 @@ def free_groups(system: Any) -> tuple[Integers, ...]:
     held = np.zeros(n, dtype=bool)
     for term in terms:
         if term.bodies == 1:
-            held[term.particles[0][_holds(term)]] = True
+            held[term.particles[0][term.joins]] = True
     if np.all(held):
         return ()
     lowest = lowest_joined(n, terms)
@@ -41,16 +40,11 @@ def free_groups(system: Any) -> tuple[Integers, ...]:
     return tuple(np.flatnonzero(lowest == r) for r in loose)
 
 
-def _holds(term: Term) -> Any:
-    """Which rows of a term have a stiffness."""
-    return term.joins
-
-
 def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
     """The lowest particle to which each is connected, directly or not (n,)."""
     lowest = np.arange(n)
     # a bond without stiffness joins nothing
-    bonds = [[end[_holds(term)] for end in term.particles] for term in terms if term.bodies == 2]
+    bonds = [[end[term.joins] for end in term.particles] for term in terms if term.bodies == 2]
     while True:
         before = lowest.copy()
         for a, b in bonds:
@@ -116,15 +110,3 @@ def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
             if rows[0] == rows[1]:
                 found.append((one, other))
     return tuple(found)
-
-
-def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
-    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses.  Raises SceneError."""
-    q = np.zeros(masses)
-    for mode, amplitude in waves:
-        if mode not in range(1, masses + 1):
-            raise SceneError(f"waves: mode {mode}: a chain of {masses} has modes 1 to {masses}")
-        # whole turns are subtracted while the phase is still an integer multiple of 1/(n + 1) half turns
-        phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
-        q += amplitude * np.sin(np.pi * phase / (masses + 1))
-    return q

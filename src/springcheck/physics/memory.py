@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from contextlib import suppress
 from pathlib import Path
 
 from springcheck.errors import SceneError
 
-LIMITS = (("memory.max", "memory.current"), ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes"))
-"""Files below a control group's root with its limit and its use, in versions 2 and 1."""
-
 
 def available(root: Path = Path("/")) -> int | None:
-    """Bytes available to this process: by the machine, its control group and its own limit.
-
-    None on systems that do not report them.
-    """
-    found = []
+    """Bytes available to this process by the machine and by its control group; None where neither says."""
+    found, group = [], root / "sys/fs/cgroup"
     with suppress(OSError, ValueError, StopIteration):
         lines = (root / "proc/meminfo").read_text().splitlines()
         found.append(1024 * int(next(x for x in lines if x.startswith("MemAvailable:")).split()[1]))
-    for most, used in LIMITS:
+    with suppress(OSError, ValueError):
         # without a limit the file says "max"
-        with suppress(OSError, ValueError):
-            group = root / "sys/fs/cgroup"
-            found.append(int((group / most).read_text()) - int((group / used).read_text()))
-    with suppress(ImportError, OSError, ValueError, AttributeError):
-        import resource
-
-        most_here = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if most_here != resource.RLIM_INFINITY:
-            pages = int((root / "proc/self/statm").read_text().split()[0])
-            found.append(most_here - pages * os.sysconf("SC_PAGE_SIZE"))
+        found.append(int((group / "memory.max").read_text()) - int((group / "memory.current").read_text()))
     return max(0, min(found)) if found else None
 
 

@@ -32,8 +32,6 @@ class Column(NamedTuple):
     field: str
     default: float | None = None
     sign: Literal["any", "positive", "nonnegative"] = "any"
-    inverse: bool = False
-    """Whether the file gives the inverse of the field's value."""
     single: bool = True
     """Whether an engine with parameters in single precision stores this one so."""
 

@@ -39,8 +39,9 @@ def check(term: type[Term]) -> None:
     _check_parts(term)
     rng = np.random.default_rng(1)
     in_space = issubclass(term, Distances)
-    count = len([column for column in term.columns if column.field not in (term.origin, "number")])
-    whole = np.ldexp(np.rint(np.ldexp(rng.uniform(0.5, 1.5, (count, 64)), 52)), -52).astype(np.longdouble)
+    names = [column.field for column in term.columns if column.field not in (term.origin, "number")]
+    whole = np.ldexp(np.rint(np.ldexp(rng.uniform(0.5, 1.5, (len(names), 64)), 52)), -52)
+    whole = whole.astype(np.longdouble)
     parameters = [x.astype(np.float32).astype(np.longdouble) for x in whole]
     u = rng.uniform(-0.5, 0.5, 64).astype(np.float32).astype(np.longdouble) + (2.0 if in_space else 0.0)
     functions: Any = term
@@ -49,33 +50,25 @@ def check(term: type[Term]) -> None:
         points = u + SPACING * np.arange(-4, 5)[:, None]
         quotient = WEIGHTS @ np.stack([of(row, *parameters) + 0 * row for row in points]) / SPACING
         _agree(term, f"{upper} is not the derivative of {lower}", slope(u, *parameters), quotient)
-    double = [2 * parameters[0], *parameters[1:]]
-    for name in ("potential", "slope"):
-        of = getattr(functions, name)
-        wrong = f"{name} is not proportional to its first parameter, the strength"
-        _agree(term, wrong, of(u, *double), 2 * of(u, *parameters))
+        wrong = f"{lower} is not proportional to its first parameter, the strength"
+        _agree(term, wrong, of(u, 2 * parameters[0], *parameters[1:]), 2 * of(u, *parameters))
         if not in_space:
-            _agree(term, f"{name} is not 0 at rest", of(0 * u, *parameters), 0 * u)
+            _agree(term, f"{lower} is not 0 at rest", of(0 * u, *parameters), 0 * u)
     narrow = functions.slope(u.astype(np.float32), *(x.astype(np.float32) for x in parameters))
     bound = FORMULA_ROUNDINGS * 2.0**-24 * np.abs(functions.rounding(np.abs(u), u, *parameters))
     if not np.all(np.abs(narrow - functions.slope(u, *parameters)) <= bound):
         raise ValueError(f"{term.__name__}: slope rounds more than rounding(size, u, ...) says")
+    # digits beyond a double's, of which every one counts
+    fine = u + np.ldexp(rng.integers(0, 1024, 64).astype(np.longdouble), -60)
     for name in ("potential", "slope", "second"):
-        # digits beyond a double's, of which every one counts
-        fine = u + np.ldexp(rng.integers(0, 1024, 64).astype(np.longdouble), -60)
         if WIDE and not _is_wide(getattr(functions, name), fine, whole):
             raise ValueError(
                 f"{term.__name__}: {name} rounds to double precision; write it with NumPy's functions of its "
                 "arguments alone, which keep their precision"
             )
     if in_space:
-        names = [column.field for column in term.columns if column.field not in (term.origin, "number")]
-        given = dict(zip(names, parameters, strict=True)) | {
-            "u": u,
-            "exp": np.exp,
-            "log": np.log,
-            "sqrt": np.sqrt,
-        }
+        given = {"u": u, "exp": np.exp, "log": np.log, "sqrt": np.sqrt}
+        given |= dict(zip(names, parameters, strict=True))
         try:
             found = eval(term.formula, {"__builtins__": {}}, given)
         except Exception as error:

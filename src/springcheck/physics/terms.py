@@ -21,14 +21,15 @@ from springcheck.physics.distance import (
     OnDistances,
     RadialMorse,
     RadialSpring,
+    ToPoints,
 )
 from springcheck.physics.driven import Drive
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 
 __all__ = [
     "Column", "Cosine", "Damping", "Distances", "Drive", "Kepler", "LennardJones", "Morse", "OnDistances",
-    "OnPairs", "OnParticles", "Quartic", "RadialMorse", "RadialSpring", "Spring", "Term", "VanDerPol",
-    "WallSpring", "Weight", "known", "register",
+    "OnPairs", "OnParticles", "Quartic", "RadialMorse", "RadialSpring", "Spring", "Term", "ToPoints",
+    "VanDerPol", "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
@@ -87,7 +88,7 @@ class Cosine(OnParticles):
     formula: ClassVar[str] = "depth (1 - cos(wave (q - at)))"
     columns: ClassVar[tuple[Column, ...]] = (
         Column("depth", "depth"),
-        Column("length", "wave", 1.0, sign="positive", inverse=True),
+        Column("wave", "wave", 1.0, sign="positive"),
         Column("at", "at", 0.0),
     )
     depth: Floats

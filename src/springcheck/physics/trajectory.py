@@ -187,27 +187,26 @@ class Trajectory:
         both.  A file of this name is replaced, once the new one is whole.  SpringcheckError where it cannot
         be written.
         """
-        place, masses = Path(path), {} if self.scene is None else {"m": self.scene.m}
+        place, m = Path(path), None if self.scene is None else self.scene.m
         if place.suffix not in (".csv", ".npz"):
             raise SpringcheckError(f"{place}: a name that ends in .csv or .npz is needed")
         draft = place.parent / f"{place.name}.{os.urandom(8).hex()}"
         try:
             with draft.open("wb") as file:
                 if place.suffix == ".npz":
-                    more = masses if self.energy is None else {"energy": self.energy, **masses}
+                    more = {name: x for name, x in (("energy", self.energy), ("m", m)) if x is not None}
                     np.savez(file, allow_pickle=False, t=self.t, q=self.q, p=self.p, **more)
                 else:
-                    alike = {f"m{i}": np.full(len(self.t), m) for i, m in enumerate(masses.get("m", ()))}
-                    columns = {"t": self.t, **self._columns, **alike}
+                    masses = {f"m{i}": np.full(len(self.t), x) for i, x in enumerate(() if m is None else m)}
+                    columns = {"t": self.t, **self._columns, **masses}
                     rows = np.column_stack([*columns.values()])
                     np.savetxt(file, rows, "%.17g", ",", header=",".join(columns), comments="")
             draft.replace(place)
         except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise SpringcheckError(f"{place}: cannot be written: {why}") from error
-        finally:
             with suppress(OSError, ValueError):
                 draft.unlink(missing_ok=True)
+            why = getattr(error, "strerror", None) or error
+            raise SpringcheckError(f"{place}: cannot be written: {why}") from error
         return place
 
     @typed
@@ -231,13 +230,6 @@ class Trajectory:
         size = f"{len(self.t)} frame{'s' if len(self.t) != 1 else ''}, {n} particle{'s' if n != 1 else ''}"
         span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self.t) else ""
         return f"Trajectory({self.label!r}, {size}{span}, {self.outcome.status})"
-
-    def _repr_html_(self) -> str:
-        """A small table for notebooks: what it is, its first and its last frame."""
-        rows = [("frame", "t", "q", "p")]
-        shown = sorted({0, len(self.t) - 1}) if len(self.t) else []
-        rows += [(str(i), f"{self.t[i]:g}", _few(self.q[i]), _few(self.p[i])) for i in shown]
-        return html_table(repr(self), rows)
 
     @property
     def _columns(self) -> dict[str, Floats]:
@@ -264,10 +256,6 @@ def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:
 
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<p>{escape(title)}</p><table>{body}</table>"
-
-
-def _few(values: Floats) -> str:
-    return ", ".join(f"{x:.6g}" for x in values[:3]) + " ..." * (len(values) > 3)
 
 
 def library(name: str) -> Any:
@@ -304,12 +292,6 @@ class Comparison:
         if largest >= 0 and np.any(np.isnan(known)):
             said += " between those that are complete"
         return f"Comparison of {', '.join(self.labels)}: {said}"
-
-    def _repr_html_(self) -> str:
-        """The differences as a table for notebooks."""
-        rows = zip(self.labels, self.max_difference, strict=True)
-        cells = [(label, *(f"{x:.1e}" for x in row)) for label, row in rows]
-        return html_table(repr(self), [("", *self.labels), *cells])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

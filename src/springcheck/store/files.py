@@ -86,7 +86,7 @@ def told(path: Path, doing: str) -> Iterator[None]:
 def _shown(path: Path) -> Path:
     """The name under which a user knows a file: for a file of a journal, or the journal, the store's."""
     folder = path.parent if path.parent.name.endswith(JOURNAL) else path
-    return folder.with_name(folder.name.removesuffix(JOURNAL))
+    return folder.with_name(folder.name.removesuffix(JOURNAL)) if folder.name else folder
 
 
 def need_space(path: Path, size: int) -> None:

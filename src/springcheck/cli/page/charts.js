@@ -1,4 +1,4 @@
-// Charts as SVG: curves or tiles in a box, read by pointer or arrow keys.
+// Charts as SVG: curves or tiles in a box, read by pointer.
 // A bank is charts with one legend.  springcheck/figures/charts.py describes what is drawn.
 
 const LINE = 12; // pixels from one name to the next below it
@@ -11,8 +11,8 @@ class Chart {
   // spec: {title, x, y, curves, tiles, rules, labels, note, equal}; `on`: the names that are drawn
   constructor(place, spec, on) {
     this.on = on;
-    const shape = { class: "plot", tabindex: 0, role: "application", "aria-roledescription": "chart" };
-    this.box = html("div", { ...shape, ...this.listeners() });
+    const read = (event) => this.readAt(event);
+    this.box = html("div", { class: "plot", role: "img", pointermove: read, pointerup: read });
     this.said = html("output", { class: "reading" });
     this.caption = html("figcaption", {});
     this.figure = html("figure", {}, this.box, this.said, this.caption);
@@ -111,8 +111,7 @@ class Chart {
       if (at.x < high + 6 && at.x + at.width > low) made(text, { x: Number(text.getAttribute("x")) + off });
     }
     const names = spec.tiles ? "all tiles" : this.seen().map((curve) => curve.name).join(", ") || "nothing";
-    this.box.setAttribute("aria-label", `${spec.title} ${spec.y.name} over ${spec.x.name}. Shown: ${names}. `
-      + "Arrow keys read it.");
+    this.box.setAttribute("aria-label", `${spec.title} ${spec.y.name} over ${spec.x.name}. Shown: ${names}.`);
   }
 
   curve(inside, curve, x, y) {
@@ -161,7 +160,6 @@ class Chart {
     const { x, y } = this.spec, [us, vs] = this.points.get(curve);
     const note = curve.notes && curve.notes[i] ? `; ${curve.notes[i]}` : "";
     const value = y.named ? y.values[curve.y[i]] : curve.y[i] * y.factor;
-    this.where = { curve, i };
     this.say(`${curve.name}: ${x.name} ${curve.x[i] * x.factor}, ${y.name} ${value}${note}`, us[i], vs[i]);
   }
 
@@ -172,7 +170,6 @@ class Chart {
     const [, kind] = tiles.rows[j].find(([count]) => (left -= count) < 0) || [0, -1];
     const note = tiles.texts[tiles.notes.length ? tiles.notes[j][i] : -1];
     const said = [kind < 0 ? "not tried" : tiles.kinds[kind][0], ...(note ? [note] : [])].join("; ");
-    this.where = { i, j };
     this.say(`${x.name} ${x.values[i]}, ${y.name} ${y.values[j]}: ${said}`, i, j);
   }
 
@@ -190,37 +187,9 @@ class Chart {
     else this.say("");
   }
 
-  step(dx, dy) {
-    const { x, y, tiles } = this.spec, curves = this.seen();
-    const within = (v, n) => Math.min(n - 1, Math.max(0, v));
-    let { curve, i, j } = this.where || { curve: curves[0], i: tiles ? 0 : -1, j: 0 };
-    if (tiles) return this.readTile(within(i + dx, x.values.length), within(j + dy, y.values.length));
-    if (!curves.length) return;
-    curve = curves[(Math.max(0, curves.indexOf(curve)) - dy + curves.length) % curves.length];
-    do i += dx;
-    while (dx && i > 0 && i < curve.x.length - 1 && !Number.isFinite(this.points.get(curve)[1][i]));
-    this.readPoint(curve, within(i, curve.x.length));
-  }
-
-  listeners() {
-    const place = ({ clientX, clientY }) => {
-      const { left, top, width, height } = this.box.getBoundingClientRect();
-      return [((clientX - left) * this.W) / width, ((clientY - top) * this.H) / height];
-    };
-    const acts = {
-      ArrowRight: () => this.step(1, 0), ArrowLeft: () => this.step(-1, 0), ArrowUp: () => this.step(0, 1),
-      ArrowDown: () => this.step(0, -1),
-    };
-    const read = (event) => this.read(...place(event));
-    return {
-      pointermove: read,
-      pointerup: read,
-      keydown: (event) => {
-        if (!Object.hasOwn(acts, event.key) || event.ctrlKey || event.metaKey || event.altKey) return;
-        event.preventDefault();
-        acts[event.key]();
-      },
-    };
+  readAt({ clientX, clientY }) {
+    const { left, top, width, height } = this.box.getBoundingClientRect();
+    this.read(((clientX - left) * this.W) / width, ((clientY - top) * this.H) / height);
   }
 }
 
@@ -230,12 +199,11 @@ class Bank {
     // columns that are named need the width of the page
     const wide = bank.charts.length === 1 || bank.charts.some((chart) => chart.x.named);
     const on = new Set(bank.on), grid = html("div", { class: wide ? "one" : "pair" });
-    const legend = html("fieldset", {}, html("legend", {}, bank.title)), boxes = [];
+    const legend = html("fieldset", {}, html("legend", {}, bank.title));
     const add = (name, drawn, title, change) => {
       const box = html("input", { type: "checkbox" });
       made(box, { change: () => change(on[box.checked ? "add" : "delete"](name)) });
       box.checked = on.has(name);
-      boxes.push(box);
       legend.append(html("label", { title }, box, ...drawn, name));
     };
     place.append(legend, grid);
@@ -256,10 +224,6 @@ class Bank {
       if (line) sample.append(stroked("M0 6H30", look));
       if (marks) sample.append(marked(`M15 6${look.mark}`, look));
       add(name, [sample], title || group, () => this.charts.forEach((chart) => chart.draw()));
-    }
-    for (const [text, checked] of boxes.length > 2 ? [["all", true], ["none", false]] : []) {
-      const click = () => boxes.forEach((box) => box.checked !== checked && box.click());
-      legend.append(html("button", { type: "button", click }, text));
     }
   }
 }

@@ -68,7 +68,7 @@ class Passed:
 
     @property
     def found(self) -> str:
-        """What its states show, the first check that failed, and why."""
+        """The diagnosis, the first check that failed, and why."""
         first = next((v for v in self.verdicts if v.passed is False), None)
         if first is None:
             return ""

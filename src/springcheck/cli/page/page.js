@@ -26,27 +26,26 @@ function compared(run) {
 
 function selfCheck() {
   const place = by("selfcheck"), said = { wrong: [], equal: [], near: [], not: [], told: [] };
-  if (!place) return;
-  const lines = [], failed = [], { runs } = DATA, frames = new Set();
-  const put = (words, labels) => labels.length && lines.push(`${words}: ${labels.join(", ")}`);
-  for (const run of DATA.linear ? runs : []) {
+  if (!place || !DATA.linear) return;
+  const { runs } = DATA, lines = [], failed = [], frames = new Set();
+  for (const run of runs) {
     const [kind, text] = compared(run);
     said[kind].push(run.label);
     if (kind === "equal") frames.add(run.t.length);
-    (kind === "told" ? failed : lines).push(text);
+    if (text) (kind === "told" ? failed : lines).push(text);
   }
-  put(`q and p the same doubles (${[...frames].join(", ")} frames)`, said.equal);
-  put("the scheme's motion to rounding, or the exact one to tolerance", said.near);
+  const { equal, near, wrong } = said;
+  const put = (words, labels) => labels.length && lines.push(`${words}: ${labels.join(", ")}`);
+  put(`q and p the same doubles (${[...frames].join(", ")} frames)`, equal);
+  put("the scheme's motion to rounding, or the exact one to tolerance", near);
   put("not computed again here", said.not);
-  const { equal, near, wrong } = said, list = lines.map((text) => html("li", {}, text));
-  const bad = ["differs", "bad", "Your browser and this file differ:"];
-  const [result, look, head] = wrong.length ? bad
-    : !DATA.linear ? ["none", "", place.textContent]
+  const [result, look, head] = wrong.length ? ["differs", "bad", "Your browser and this file differ:"]
     : !equal.length && !near.length ? ["none", "", "None of these methods is computed again here."]
       : ["equal", "good", `Your browser = this file: ${equal.length} of ${runs.length} methods to the last `
         + `bit, ${near.length} to rounding or tolerance.`];
   place.dataset.result = result;
-  place.replaceChildren(html("p", { class: look }, head), html("ul", {}, ...list));
+  const list = html("ul", {}, ...lines.map((text) => html("li", {}, text)));
+  place.replaceChildren(html("p", { class: look }, head), list);
   place.after(...failed.map((text) => html("p", { class: "bad" }, text)));
 }
 

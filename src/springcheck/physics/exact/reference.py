@@ -7,7 +7,7 @@ series of the momenta just ends in rounding.  The stages are found by fixed-poin
 States are sums with compensation.  Between the ends of steps the series gives every state.
 
 A second integration with fewer stages takes other steps, so that truncation and rounding differ.  It starts
-a rounding away, because both round the argument of a force alike, which near an unstable rest decides the
+some roundings away, because both round the argument of a force alike, which near an unstable rest decides the
 motion.  The stated error is a multiple of the largest difference so far, plus other roundings that both
 share.
 """
@@ -29,7 +29,9 @@ STAGES, FEWER_STAGES = 20, 16
 """Stages of the integration that counts, and of the one that it is compared with."""
 NOISE = 32
 """Largest share of the last two Legendre coefficients of a step, in units of rounding."""
-FELT = 6
+NUDGE = 4 * EPS
+"""Relative change of the start of the second one, several roundings: it grows as they do."""
+FELT = 3
 """The stated error in units of the largest difference of both integrations."""
 FELT_ROUNDING = 4 * EPS
 """The least stated error, relative to the largest size so far and to the time: roundings of the constants of
@@ -152,7 +154,10 @@ class Path:
         self.m, self.q, self.p = wide(system.m), wide(system.q), wide(system.p)
         # what rests exactly is not moved
         moves = (self.p != 0) | (system.force(self.q, self.p) != 0)
-        self.q = self.q * (1 + np.where(moves, np.longdouble(nudge), 0))
+        # by signs of no pattern: a change of scale would leave directions as they are
+        signs = np.where(np.arange(system.n) * 2654435761 % 2**32 < 2**31, 1, -1)
+        away = 1 + np.where(moves, signs * np.longdouble(nudge), 0)
+        self.q, self.p = self.q * away, self.p * away[::-1]
         self.q_rest, self.p_rest = np.zeros_like(self.q), np.zeros_like(self.p)
         self.unit, self.power, self.calls, self.patience = np.longdouble(unit), 0, 0, 0
         self.done, self.starts, self.series = [np.longdouble(0)], [self.q], list[Extended]()
@@ -305,10 +310,11 @@ class ReferenceMotion(ClosedForm):
             unit = sign * self.system.scene.step
             self.paths[sign] = (
                 Path(self.system, unit, STAGES),
-                Path(self.system, unit, FEWER_STAGES, nudge=EPS),
+                Path(self.system, unit, FEWER_STAGES, nudge=NUDGE),
             )
         one, other = self.paths[sign]
-        ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), *[np.zeros((1, self.n))] * 2))
+        none = np.zeros((1, self.n), np.longdouble)
+        ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), none, none))
         if ends[-1] >= end:
             return
         for path in (one, other):

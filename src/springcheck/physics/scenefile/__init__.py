@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 import tomllib
 from collections.abc import Iterator
 from os import PathLike
@@ -88,9 +88,8 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
 
 def from_tables(data: Any, *, name: str, where: str) -> Scene:
     """The scene that the tables of a scene file describe.  Raises SceneError."""
-    for field, value in _numbers(data):
-        if not math.isfinite(value):
-            raise SceneError(f"{where}: {field} = {value}; a finite number is needed")
+    for field in _not_finite(data):
+        raise SceneError(f"{where}: {field}; a finite number is needed")
     if reason := left.refusal(data):
         raise SceneError(f"{where}: {reason}")
     try:
@@ -113,21 +112,16 @@ def _unreadable(message: str, text: str) -> str:
     return what + line
 
 
-def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """All numbers in nested tables, each with its field's path."""
-    if isinstance(data, bool):
-        return
+def _not_finite(data: Any, path: str = "") -> Iterator[str]:
+    """Field and value of each number in nested tables that no double holds."""
     if isinstance(data, dict):
         for key, value in data.items():
-            yield from _numbers(value, f"{path}.{key}" if path else str(key))
+            yield from _not_finite(value, f"{path}.{key}".lstrip("."))
     elif isinstance(data, list):
         for i, value in enumerate(data):
-            yield from _numbers(value, f"{path}[{i}]")
-    elif isinstance(data, int | float):
-        try:
-            yield path, float(data)
-        except OverflowError:
-            yield path, math.inf
+            yield from _not_finite(value, f"{path}[{i}]")
+    elif isinstance(data, int | float) and not abs(data) <= sys.float_info.max:
+        yield f"{path} = {data if isinstance(data, float) else 'inf'}"
 
 
 _WORDS = {

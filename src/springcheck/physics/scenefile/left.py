@@ -10,6 +10,8 @@ LEFT = {
     "modulated-spring": "springs of modulated stiffness are not part of springcheck",
     "rod": "constraints are not part of springcheck",
     "rotor": "rotors and hinges are not part of springcheck",
+    "time.every": "it is record.every",
+    "cosine.length": "give wave = 1/length",
 }
 """Why a table, or a field as ``table.field``, is refused."""
 

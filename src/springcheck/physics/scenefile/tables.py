@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple, cast, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
@@ -99,7 +99,6 @@ class TimeTable(SceneTable, frozen=True):
 
     step: float
     steps: Count
-    every: Count | None = None
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
 
 
@@ -119,24 +118,8 @@ class MethodsTable(SceneTable, frozen=True):
 class RecordTable(SceneTable, frozen=True):
     """Number of steps between recorded frames, and the recorded quantities."""
 
-    every: Count | None = None
+    every: Count = 1
     quantities: tuple[Quantity, ...] = ("q", "p", "energy")
-
-
-class Body(NamedTuple):
-    """A kind of body: the kind of its scenes, the word for several, and its table's names of m, q and p."""
-
-    kind: Kind
-    several: str
-    columns: tuple[str, ...] = ()
-
-
-BODIES = {
-    "particle": Body("particles", "particles", ("mass", "position", "momentum")),
-    "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
-    "chain": Body("particles", "masses"),
-}
-"""Kinds of bodies by the names of their tables."""
 
 
 class SceneBase(SceneTable, frozen=True):
@@ -161,29 +144,24 @@ class SceneBase(SceneTable, frozen=True):
 _SIGNS: dict[str, Any] = {"any": float, "positive": Positive, "nonnegative": NonNegative}
 
 
-def _of_term(term: Any) -> type[SceneTable]:
+def _of_term(term: Any) -> Any:
     """The table of a term: its particle or two ends, its axis, and its columns."""
-    fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
-    names = {}
     in_space = issubclass(term, terms.OnDistances)
+    columns = term.columns[:-1] if in_space else term.columns
+    fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
     if in_space:
         fields = [("ends", tuple[End, End]), ("wall", float | PerAxis, 0.0)]
-    for column in term.columns[: -1 if in_space else None]:
-        kind: Any = _SIGNS[column.sign]
-        name = identifier(column.name)
-        names[name] = column.name
-        if column.inverse:
-            # given itself, or its inverse under the name of the field
-            fields += [(name, kind | None, None), (column.field, kind | None, None)]
-            continue
-        fields.append((name, kind) if column.default is None else (name, kind, column.default))
-    if not in_space:
-        fields.append(("axis", Axis | None, None))
-    table = msgspec.defstruct(
-        f"{term.__name__}SceneTable", fields, bases=(SceneTable,), frozen=True, kw_only=True, rename=names,
-        namespace={"__doc__": term.__doc__},
-    )  # fmt: skip
-    return cast(type[SceneTable], table)
+    for column in columns:
+        default = () if column.default is None else (column.default,)
+        fields.append((identifier(column.name), _SIGNS[column.sign], *default))
+    return msgspec.defstruct(
+        f"{term.__name__}SceneTable",
+        fields if in_space else [*fields, ("axis", Axis | None, None)],
+        bases=(SceneTable,),
+        frozen=True,
+        kw_only=True,
+        rename={identifier(column.name): column.name for column in columns},
+    )
 
 
 def identifier(name: str) -> str:
@@ -191,14 +169,10 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring")
-"""Keys of the terms with tables of their own."""
-
-
 def of_terms() -> tuple[Any, ...]:
     """Terms that are read by their columns alone."""
-    every = terms.known().items()
-    return tuple(x for key, x in every if key not in OWN_TABLES and not issubclass(x, ToPoints))
+    known = terms.known().values()
+    return tuple(x for x in known if not issubclass(x, terms.WallSpring | terms.Spring | ToPoints))
 
 
 def scene_table() -> Any:

@@ -4,175 +4,96 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Floats
 from springcheck.physics.distance import Distances
 from springcheck.physics.fields import SceneFields
-from springcheck.physics.graph import standing
-from springcheck.physics.scenefile.tables import BODIES
+from springcheck.physics.scenefile import tables
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Column, Damping, Spring, WallSpring
+from springcheck.physics.terms import Spring, WallSpring
 
-MOST_WAVES = 64
-"""Most standing waves by which the start of a chain is written."""
+Row = dict[str, Any]
 
 
 def text(system: System[Any]) -> str:
     """The scene file of a system's scene."""
     scene: SceneFields = system.scene
-    head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
-    lines = [_assigned(head)]
+    lines = [_assigned({name: getattr(scene, name) for name in ("title", "source", "units", "kind")})]
+    springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
     is_chain = scene.places is None and scene.kind == "particles" and system.is_uniform_chain
-    is_chain &= all(_rest_in_0(term) for term in scene.terms if isinstance(term, WallSpring | Spring))
+    is_chain &= not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
     if is_chain:
-        lines += _chain(scene)
+        known = {"masses": scene.n, "mass": scene.m[0], "stiffness": springs[0].k[0]}
+        start = {"position": scene.q.tolist()} | ({"momentum": scene.p.tolist()} if np.any(scene.p) else {})
+        lines.append(_table("[chain]", known | start))
     else:
-        table, names = next((name, of.columns) for name, of in BODIES.items() if of.kind == scene.kind)
-        lines += [_table(f"[[{table}]]", row) for row in _bodies(scene, names)]
+        name = "inductor" if scene.kind == "circuit" else "particle"
+        lines += [_table(f"[[{name}]]", row) for row in _bodies(scene)]
     for term in scene.terms:
-        if not (is_chain and isinstance(term, WallSpring | Spring)):
-            lines += _rows(scene, term)
+        if not (is_chain and term in springs):
+            key = "spring" if term in springs else term.key
+            key = key.removeprefix("wall-") if isinstance(term, Distances) else key
+            lines += [_table(f"[[{key}]]", row) for row in _rows(scene, term)]
     if scene.bath:
-        given = {"temperature": scene.bath.temperature, "friction": scene.bath.friction}
-        lines.append(_table("[bath]", given.items()))
-    time = {"step": scene.step, "steps": scene.steps, "tolerance": scene.tolerance}
-    lines.append(_table("[time]", time.items()))
-    lines.append(_table("[methods]", [("include", list(scene.include))]))
-    record = {"every": scene.every, "quantities": list(scene.quantities)}
-    lines.append(_table("[record]", record.items()))
+        lines.append(_table("[bath]", {x: getattr(scene.bath, x) for x in ("temperature", "friction")}))
+    lines.append(_table("[time]", {x: getattr(scene, x) for x in ("step", "steps", "tolerance")}))
+    lines.append(_table("[methods]", {"include": list(scene.include)}))
+    lines.append(_table("[record]", {"every": scene.every, "quantities": list(scene.quantities)}))
     return "\n".join(lines) + "\n"
 
 
-def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple[str, Any]]]:
+def _bodies(scene: SceneFields) -> Iterator[Row]:
     """Rows of the bodies: one number for each column, or for each of its axes."""
-    rows = list(zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True))
+    of = tables.InductorTable if scene.kind == "circuit" else tables.ParticleTable
+    rows = zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True)
     if scene.places is None:
-        yield from (zip(names, row, strict=True) for row in rows)
+        yield from (dict(zip(of.__struct_fields__, row, strict=False)) for row in rows)
         return
-    places = scene.places.tolist()
-    for _, several in itertools.groupby(zip(places, rows, strict=True), lambda one: one[0] // 3):
-        at, own = zip(*several, strict=True)
-        m, q, p = zip(*own, strict=True)
-        along = "".join("xyz"[place % 3] for place in at)
-        yield zip((*names, "axes"), (m[0], list(q), list(p), along), strict=True)
+    coordinates = zip(scene.places.tolist(), rows, strict=True)
+    for _, several in itertools.groupby(coordinates, lambda one: one[0] // 3):
+        places, states = zip(*several, strict=True)
+        m, q, p = zip(*states, strict=True)
+        axes = "".join("xyz"[place % 3] for place in places)
+        yield {"mass": m[0], "position": list(q), "momentum": list(p), "axes": axes}
 
 
-def _rest_in_0(term: Term) -> bool:
-    """Whether springs rest in 0 and are not fast, as those of a [chain] and capacitors do."""
-    return not (term.fast or np.any(getattr(term, term.origin)))
-
-
-def _chain(scene: SceneFields) -> Iterator[str]:
-    k = next(term.k for term in scene.terms if isinstance(term, Spring))
-    known: dict[str, Any] = {"masses": scene.n, "mass": scene.m[0], "stiffness": k[0]}
-    waves = None if np.any(scene.p) else _waves(scene.q)
-    if waves is None:
-        known |= {"position": scene.q.tolist(), "momentum": scene.p.tolist()}
-    yield _table("[chain]", known.items())
-    for mode, amplitude in waves or ():
-        yield _table("[[chain.wave]]", [("mode", mode), ("amplitude", amplitude)])
-
-
-def _waves(q: Floats) -> list[tuple[int, float]] | None:
-    """The few standing waves (mode, amplitude) whose sum is q to the last bit; None where there are none."""
-    n = len(q)
-    odd = np.concatenate([[0.0], q, [0.0], -q[::-1]])
-    amplitudes = -np.fft.rfft(odd).imag[1 : n + 1] / (n + 1)
-    size = np.max(np.abs(amplitudes))
-    if not np.isfinite(size) or size == 0:
-        return None
-    large = np.flatnonzero(np.abs(amplitudes) > 1e-12 * size)
-    if len(large) > min(MOST_WAVES, n // 2 + 1):
-        return None
-    # an amplitude from a file has few digits
-    for digits in (3, 6, 9, 12, 15, 17):
-        found = [(int(j) + 1, float(f"{amplitudes[j]:.{digits}g}")) for j in large]
-        orders: Any = itertools.permutations(found) if len(found) <= 4 else (found, found[::-1])
-        for waves in orders:
-            if np.array_equal(standing(n, waves), q):
-                return list(waves)
-    return None
-
-
-def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
-    if isinstance(term, Damping) and scene.kind == "circuit":
-        for loop, resistance in term.rows():
-            yield _table("[[resistor]]", [("loop", loop), ("resistance", resistance)])
-    elif isinstance(term, WallSpring | Spring) and scene.kind == "circuit" and _are_capacitors(term):
-        for *loops, k, _ in term.rows():
-            yield _table("[[capacitor]]", [("loops", loops), ("capacitance", 1 / k)])
-    elif isinstance(term, WallSpring | Spring):
-        for *at, k, rest in term.rows():
-            ends, axis = _ends(scene, at)
-            row: dict[str, Any] = {"ends": ["wall", *ends][-2:], "stiffness": k, **axis}
-            # the name of its origin: wall or rest
-            row |= {term.columns[1].name: rest} if rest else {}
-            yield _table("[[spring]]", (row | ({"fast": True} if term.fast else {})).items())
-    elif isinstance(term, Distances):
-        yield from _distances(scene, term)
-    else:
-        yield from _by_columns(scene, term)
-
-
-def _distances(scene: SceneFields, term: Distances) -> Iterator[str]:
-    """One table for the rows of each distance."""
-    for first, last in itertools.pairwise([*term.firsts.tolist(), len(term)]):
-        ends, _ = _ends(scene, [int(index[first]) for index in term.particles])
-        row: dict[str, Any] = {"ends": ["wall", *ends][-2:]}
+def _rows(scene: SceneFields, term: Term) -> Iterator[Row]:
+    """A row for each of a term's, or for each of its distances."""
+    in_space, is_spring = isinstance(term, Distances), isinstance(term, WallSpring | Spring)
+    firsts: Iterable[int] = term.firsts.tolist() if isinstance(term, Distances) else range(len(term))
+    for first, last in itertools.pairwise([*firsts, len(term)]):
+        ends, axis = _ends(scene, [int(index[first]) for index in term.particles])
+        row: Row = {"ends": ["wall", *ends][-2:]}
+        if term.bodies == 1 and not (in_space or is_spring):
+            row = {"particle": ends[0]}
+        row |= {} if in_space else axis
         for column in term.columns:
-            if column.field not in (term.origin, "number"):
-                row |= [_given(term, column, first)]
-        if term.origin and np.any(at := getattr(term, term.origin)[first:last]):
-            row["wall"] = at.tolist()
-        yield _table(f"[[{term.key.removeprefix('wall-')}]]", row.items())
+            values = getattr(term, column.field)[first:last].tolist()
+            if in_space and column.field == term.origin:
+                row |= {"wall": values} if any(values) else {}
+            elif column.field != "number" and values[0] != column.default:
+                row[column.name] = values[0]
+        yield row | ({"fast": True} if term.fast else {})
 
 
-def _given(term: Term, column: Column, j: int) -> tuple[str, float]:
-    """Name and value of a column in a file: the inverse where it has the same number as its inverse."""
-    value = float(getattr(term, column.field)[j])
-    inverse = 1 / value if column.inverse and abs(value) > 1e-307 else 0.0
-    # the inverse of an inverse is often, not always, the same number
-    if inverse and 1 / inverse == value:
-        return column.name, inverse
-    return column.field if column.inverse else column.name, value
-
-
-def _ends(scene: SceneFields, coordinates: Sequence[int]) -> tuple[list[int], dict[str, str]]:
+def _ends(scene: SceneFields, coordinates: list[int]) -> tuple[list[int], dict[str, str]]:
     """The particles of these coordinates, and their axis where that is not x for all."""
     if scene.places is None:
-        return list(coordinates), {}
-    particles, axes = np.divmod(scene.places[list(coordinates)], 3)
+        return coordinates, {}
+    particles, axes = np.divmod(scene.places[coordinates], 3)
     return particles.tolist(), {"axis": "xyz"[axes[0]]}
 
 
-def _are_capacitors(term: WallSpring | Spring) -> bool:
-    """Whether every row is V = q**2 / 2C with a C whose inverse is the stiffness to the last bit."""
-    with np.errstate(divide="ignore", over="ignore"):
-        capacitance = 1 / term.k
-        exact = (term.k > 0) & (capacitance > 0) & np.isfinite(capacitance) & (1 / capacitance == term.k)
-    return bool(np.all(exact)) and _rest_in_0(term)
+def _table(head: str, values: Row) -> str:
+    return f"\n{head}\n{_assigned(values)}"
 
 
-def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
-    for j, at in enumerate(zip(*(index.tolist() for index in term.particles), strict=True)):
-        ends, axis = _ends(scene, at)
-        row: dict[str, Any] = {"particle": ends[0]} if len(ends) == 1 else {"ends": ends}
-        row |= axis
-        row |= [_given(term, column, j) for column in term.columns]
-        yield _table(f"[[{term.key}]]", row.items())
-
-
-def _table(head: str, items: Any) -> str:
-    return f"\n{head}\n{_assigned(dict(items))}"
-
-
-def _assigned(values: dict[str, Any]) -> str:
-    return "".join(f"{name} = {_value(value)}\n" for name, value in values.items()).rstrip("\n")
+def _assigned(values: Row) -> str:
+    return "\n".join(f"{name} = {_value(value)}" for name, value in values.items())
 
 
 def _value(value: Any) -> str:

@@ -17,7 +17,7 @@ from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
-from springcheck.studies.precision import fits
+from springcheck.studies.precision import bare, fits
 from springcheck.studies.precision.accuracy import MOST_COMPARED_FRAMES, Errors, Truth
 from springcheck.studies.precision.points import CANNOT_RUN, Point
 from springcheck.text.wording import count
@@ -107,8 +107,8 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweeping:
             needed = coarsest(known, limit)
             raise MethodError(f"its coarsest run takes {needed:.0e} steps, more than {MOST_STEPS:.0e}")
         # the first run imports and compiles
-        driver.bare(replace(sweep.scene, steps=1), label, planned=PLANNED)
-        first = driver.bare(timed_scene(plain, sweep), label, planned=PLANNED).timing
+        bare.measure(replace(sweep.scene, steps=1), label, planned=PLANNED)
+        first = bare.measure(timed_scene(plain, sweep), label, planned=PLANNED).timing
         sweep.start, sweep.run = first.start, first.run
     except MethodError as error:
         sweep.scene = None
@@ -183,7 +183,7 @@ def level(sweeps: Sequence[Sweeping], known: Truth, tell: Callable[[str], None])
         tell(f"{sweep.label}, errors")
         points.append(errors(sweep, known))
     tell(f"timing {count(len(sweeps), 'method')} in turn")
-    timings: list[list[driver.Bare]] = [[] for _ in sweeps]
+    timings: list[list[bare.Bare]] = [[] for _ in sweeps]
     going = [j for j, point in enumerate(points) if point.complete]
     scenes = [timed_scene(known.scene, sweep) for sweep in sweeps]
     for number in range(1 + repeats(0)):
@@ -196,14 +196,14 @@ def level(sweeps: Sequence[Sweeping], known: Truth, tell: Callable[[str], None])
                 continue
             began = perf_counter()
             try:
-                bare = driver.bare(scenes[j], sweep.label, copies=copies, planned=PLANNED)
+                cost = bare.measure(scenes[j], sweep.label, copies=copies, planned=PLANNED)
             except Stopped as stop:
                 points[j] = replace(sweep.point("stopped", str(stop)), spent_seconds=points[j].spent_seconds)
                 going.remove(j)
                 continue
             took = perf_counter() - began
             points[j] = replace(points[j], spent_seconds=points[j].spent_seconds + took)
-            timings[j] += [bare] if number else []
+            timings[j] += [cost] if number else []
             runs = [x.timing.run for x in timings[j]]
             stable = len(runs) > 2 and min(runs[:-2]) <= STABLE * min(runs)
             if stable or len(runs) >= repeats(run):

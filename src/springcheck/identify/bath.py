@@ -1,10 +1,4 @@
-"""Identification of thermostats: `springcheck.bath` finds random ones, a factor of all momenta the others.
-
-A Nose-Hoover chain, or a thermostat that rescales, multiplies all momenta by one factor in each step.  Of one
-particle any factor may be.  Of several, b + F c is what the factor acts on, or has made, of each, with
-unknown constants c of linear forces; the factor cancels in the ratio of two particles, which is linear in c
-once it is multiplied out.
-"""
+"""Identification of thermostats, by `springcheck.bath`: their map, friction and noise."""
 
 from __future__ import annotations
 
@@ -18,11 +12,9 @@ import numpy as np
 from springcheck.bath.catalogue import THERMOSTATS
 from springcheck.errors import IdentificationError
 from springcheck.identify.bath_modes import FREE_OF_NOISE, modes
-from springcheck.identify.bath_residuals import FEWEST, is_of_digits
+from springcheck.identify.bath_residuals import FEWEST
 from springcheck.identify.bath_states import Thermal, identify_thermal
 from springcheck.identify.clock import clock_of
-from springcheck.identify.evidence import AGREES
-from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
@@ -34,84 +26,8 @@ OF_UNITS = "look at the units of what is stated, and at what the engine was give
 
 REMEDY = "record every step, each oscillator by itself, with the velocities that the engine stores"
 
-PLACES_OF_FACTOR = ("before velocity Verlet", "after velocity Verlet", "amid the drift of leapfrog")
-
-SHARP_FACTOR = 1e-3
-"""Largest residual of one factor for all momenta, relative to the factor's spread; unlike factors leave 1."""
-
-UNLIKE_MOTION = 1e-5
-"""Relative difference of two particles' products, below which their motions are proportional."""
-
-
-def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | None:
-    """Place in a step of h at which one factor multiplies the velocities v (f, n) of q (f, n), the relative
-    residual, and the factors (f - 1,); None where no factor that varies from step to step explains them, and
-    where a path that bends only once leaves them one freedom, of which any factor may be."""
-    x, n = q - np.mean(q, axis=0), q.shape[1]
-    if any(_bends(x[:, 0], y) or _bends(y, x[:, 0]) for y in x[:, 1:].T):
-        return None
-    here, both = (np.column_stack([y, np.ones(len(y))]) for y in (x[:-1], x[:-1] + x[1:]))
-    ways = ((v[:-1], np.diff(x, axis=0) / h, here), (v[1:], v[:-1], both), (v[1:], v[:-1], here))
-    for i, (a, b, F) in enumerate(ways):
-        misfit, pulled, irregular = 0.0, b.copy(), True
-        for j in range(1, n):
-            one, other = a[:, j] * b[:, 0], a[:, 0] * b[:, j]
-            unlike = float(np.linalg.norm(one - other))
-            if not unlike > UNLIKE_MOTION * np.linalg.norm(np.abs(one) + np.abs(other)):
-                return None
-            columns = np.concatenate([-a[:, [j]] * F, a[:, [0]] * F], axis=1)
-            c = np.linalg.lstsq(columns, one - other, rcond=None)[0]
-            left = one - other - columns @ c
-            misfit = max(misfit, float(np.linalg.norm(left)) / unlike)
-            # of a short arc many constants come near any smooth motion; rounding is all that a factor leaves
-            irregular = irregular and is_of_digits(left[::2])
-            pulled[:, 0], pulled[:, j] = b[:, 0] + F @ c[: n + 1], b[:, j] + F @ c[n + 1 :]
-        of, made = (pulled, a) if i else (a, pulled)
-        factor = np.sum(of * made, axis=1) / np.sum(of**2, axis=1)
-        # of velocities that are linear in the positions any c would do: there the factor makes none of them
-        off = np.linalg.norm(made - factor[:, None] * of, axis=0) / np.linalg.norm(made, axis=0)
-        high, low = np.quantile(factor, [0.9, 0.1])
-        # a factor of either sign, which Bussi's thermostat draws, comes near more motions
-        sharp = SHARP_FACTOR if low > 0 else SHARP_FACTOR**2
-        if irregular and max(misfit, *off) < sharp * (high - low) / max(abs(high), abs(low)):
-            return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
-    return None
-
-
-def _bends(x: Floats, y: Floats) -> bool:
-    """Whether y (f,) is a quadratic function of x (f,), as along an arc."""
-    powers = np.vander(x / np.max(np.abs(x)), 3)
-    left = y - powers @ np.linalg.lstsq(powers, y)[0]
-    return bool(np.linalg.norm(left) <= UNLIKE_MOTION * np.linalg.norm(y))
-
-
-def explained(
-    found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any, **stated: Any
-) -> Identification:
-    """Identification of a bath in states (f, n) at times t (f,) that no scheme explains, or `found`."""
-    given = _given(t, q, p, v, mass)
-    if given is None:
-        return found
-    times, positions, u, _ = given
-    found = of_bath(t, q, p, v, mass, **stated) or found
-    if positions.shape[1] < 2 or found.verdict == "named":
-        return found
-    with np.errstate(all="ignore"):
-        seen = one_factor(float(np.mean(np.diff(times))), positions, u)
-    if seen is None:
-        return found
-    place, misfit, factor = seen
-    low, high = np.quantile(factor, [0.1, 0.9])
-    kept = tuple(x for x in found.candidates if THERMOSTATS[x.scheme].rescales)
-    which = " or ".join(x.scheme for x in kept) or "a Nose-Hoover chain, or a thermostat that rescales"
-    cause = (
-        f"One factor a step multiplies the momenta of all {u.shape[1]} coordinates, {place}: {low:.3g} to "
-        f"{high:.3g} in most steps, to {misfit:.0e} of how unlike they move: {which}"
-    )
-    remedy = "judge it by its scheme, which the factor alone does not tell; its bath is in no frame"
-    notes = tuple(note for note in found.notes if not kept or note.split(":")[0] in {x.scheme for x in kept})
-    because = () if kept else (Explanation(cause, remedy, misfit),)
-    return replace(found, statement=cause, candidates=kept, notes=notes, explanations=because)
+SURE, ERRORS, AGREES = 6.0, 5.0, 1e-6
+"""Standard errors of what is sure and of what is likely, and the relative difference that agrees."""
 
 
 def of_bath(

@@ -1,25 +1,59 @@
-"""Which schemes take a step: of a nonlinear force there is no map to fit, but each scheme's own step."""
+"""Which schemes, and which mistakes, take the recorded steps with the scene's force, whatever it is."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
+from springcheck.identify.catalogue import COMPARE, OLD_FORCE, TABLEAUX, capital
+from springcheck.identify.catalogue import STEPS as MISTAKES
+from springcheck.identify.result import Candidate, Explanation, Identification, nothing
+from springcheck.identify.rows import HALF, ONE
 from springcheck.identify.storage import BINARY, storage
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes import ATTACHED, SCHEMES, Law, Scheme, matrix, propagate, scheme, title
-from springcheck.text.wording import either
+from springcheck.text.wording import count, either
 
 OF_ERROR = 1e-3
 """Largest difference from a scheme's step, relative to its truncation error: that of an engine's solver of
 implicit steps.  Other schemes differ by about 1."""
 
+MOST_FRAMES = 400
+"""Frames whose steps are compared where a scene is stated."""
+
 STEPS, MOST_STEPS = 24, 100
 """Recorded frames that are compared, and most steps from one to the next."""
+
+
+def _mistake(text: str, **step: Any) -> Scheme:
+    return Scheme(name=text, title=text, order=0, limit=0.0, symplectic=False, **step)
+
+
+WRONG = {
+    one.name: one
+    for one in (
+        _mistake(OLD_FORCE, stages=(("kick", HALF), ("drift", ONE), ("held", HALF))),
+        *(_mistake(text, stages=step) for _, text, _, step in MISTAKES if not callable(step)),
+        *(
+            _mistake(
+                capital(text),
+                b=tuple(map(Fraction, b)),
+                a=tuple(tuple(map(Fraction, (*row, *[0] * (len(b) - len(row))))) for row in a),
+            )
+            for text, a, b in TABLEAUX
+        ),
+    )
+}
+"""Mistakes as schemes, by their sentences."""
+
+WRONG_REMEDIES = {text: remedy for _, text, remedy, _ in MISTAKES}
 
 
 def takers(
@@ -33,7 +67,7 @@ def takers(
     size = [np.max(np.abs(x), axis=1, keepdims=True) for x in end]
     found = []
     for name in names:
-        whole, half = (Law(scheme=scheme(name), scene=scene, h=h / n) for n in (1, 2))
+        whole, half = (Law(scheme=WRONG.get(name) or scheme(name), scene=scene, h=h / n) for n in (1, 2))
         once = twice = start
         with np.errstate(all="ignore"):
             for _ in range(every):
@@ -124,11 +158,21 @@ def _unit(x: Floats, steps: Integers, roundoff: float, least: float) -> Floats:
 def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
     """One sentence on the schemes of the catalogue that take the recorded steps around a frame; "" where none
     does, and where frames are more than `MOST_STEPS` apart."""
-    if run.every > MOST_STEPS:
-        return ""
     first = max(0, min(about - STEPS // 2, len(run.t) - STEPS))
-    frames, system = slice(first, first + STEPS + 1), scene.system
-    q, p = run.q[frames], run.p[frames]
+    found = _taking(scene, run, slice(first, first + STEPS + 1))
+    # that steps which failed are nearly the scheme's own is no cause
+    titles = [title(name) for name in found if run.scheme not in found]
+    if titles and titles[0] in WRONG:
+        return titles[0]
+    what = "step recorded there is that" if run.every == 1 else f"frame there follows by {run.every} steps"
+    return f"Every {what} of {either(titles)}" if titles else ""
+
+
+def _taking(scene: Scene, run: Trajectory, frames: slice, least: float = 2.0**-49) -> tuple[str, ...]:
+    """Schemes and mistakes that take each of these frames to the next."""
+    if run.every > MOST_STEPS:
+        return ()
+    q, p, system = run.q[frames], run.p[frames], scene.system
     if system.is_driven:
         t = run.t[frames, None]
         q, p = np.hstack([q, t]), np.hstack([p, np.full_like(t, CLOCK)])
@@ -136,12 +180,41 @@ def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
     idle = {"mixes"} if not any(term.fast for term in scene.terms) else set[str]()
     idle |= {"friction"} if not system.is_damped or system.brakes_by_place else set()
     found: tuple[str, ...] = ()
-    for known in (SCHEMES, ATTACHED):
+    for known in (SCHEMES, WRONG, ATTACHED):
         here = {x: {*y.traits, *(kind.evaluates for kind in y.kinds)} for x, y in known.items()}
         names = [name for name, traits in here.items() if "one-step" in traits and not idle & traits]
         # a force that is held is that of a plain scheme where it is constant
-        found = found or takers(names, system.clocked, run.step, q, p, every=run.every)
-    # that steps which failed are nearly the scheme's own is no cause
-    titles = [title(name) for name in found if run.scheme not in found]
-    what = "step recorded there is that" if run.every == 1 else f"frame there follows by {run.every} steps"
-    return f"Every {what} of {either(titles)}" if titles else ""
+        found = found or takers(names, system.clocked, run.step, q, p, least, every=run.every)
+    return found
+
+
+def on_scene(scene: Scene, run: Trajectory, notes: tuple[str, ...] = ()) -> Identification:
+    """The scheme, or the mistake, whose steps with the scene's force are those of a run."""
+    least = max(2.0**-49, 8 * run.arithmetic.state)
+    found = _taking(scene, run, slice(MOST_FRAMES), least)
+    steps = f", {count(run.every, 'step')} to a frame" if run.every > 1 else ""
+    if not found:
+        some = _taking(scene, run, slice(STEPS + 1), least)
+        cause = f"No scheme known here takes the recorded steps with the force of {scene.name}{steps}"
+        if some:
+            whose = either([title(name) for name in some])
+            cause = f"The first steps are those of {whose} with the force of {scene.name}, later ones are not"
+        remedy = "look at the scene's numbers; `springcheck judge` says where steps depart from a scheme"
+        return nothing([Explanation(cause, remedy)], scene.n, notes=notes)
+    if found[0] in WRONG:
+        because = Explanation(f"{found[0]}{steps}", WRONG_REMEDIES.get(found[0], COMPARE), local=True)
+        return nothing([because], scene.n, notes=notes)
+    none = (math.nan,) * scene.n
+    each = tuple(
+        Candidate(
+            scheme=name, aliases=(), stride=run.every, step=run.step, turns=0, omega=none, stiffness=None,
+            friction=none,
+        )
+        for name in found
+    )  # fmt: skip
+    one = found[0] if len(found) == 1 else None
+    return Identification(
+        verdict="named" if one else "not told apart", scheme=one, nearest=one, candidates=each, step=run.step,
+        stride=run.every, omega=none, friction=none, determinant=none, fits=True, notes=notes,
+        statement=f"{either([title(x) for x in found])}{steps}: each step is its own on {scene.name}",
+    )  # fmt: skip
