@@ -30,21 +30,8 @@ import mpmath as mp
 import numpy as np
 
 from arguments import script
-from springcheck.physics import exact, scenefile
+from springcheck.physics import exact, scenefile, terms
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import (
-    Cosine,
-    Damping,
-    Kepler,
-    LennardJones,
-    Morse,
-    Quartic,
-    RadialMorse,
-    RadialSpring,
-    VanDerPol,
-    WallSpring,
-    Weight,
-)  # fmt: skip
 
 FOLDER = Path(__file__).parents[1] / "data" / "reference" / "motion"
 BITS, ORDER, DIGITS = 288, 48, 25
@@ -123,7 +110,8 @@ class Series:
 def forces(scene: Scene, u: list[Series], v: list[Series], t: Series) -> Iterator[tuple[int, Series]]:
     """Coordinate and force of each row of each term, at positions u, velocities v and the time t."""
     for term in scene.terms:
-        rows, distances = [dict(zip(term.arrays, row, strict=True)) for row in term.rows()], {}
+        rows = [dict(zip(term.arrays, row, strict=True)) for row in term.rows()]
+        distances: dict[float, list[Any]] = {}
         for row in rows:
             n = {name: whole(x) for name, x in row.items() if name not in (*term.ends, "number")}
             if "number" in row:
@@ -139,7 +127,7 @@ def forces(scene: Scene, u: list[Series], v: list[Series], t: Series) -> Iterato
             elif term.key == "cosine":
                 pull = (x * n["wave"]).sine_cosine()[0] * n["wave"] * n["depth"]
             elif term.key == "weight":
-                pull = Series(lambda k, f=n["force"]: -f if k == 0 else 0)
+                pull = Series(lambda k: 0, -n["force"])
             elif term.key == "morse":
                 e = (x * -n["steepness"]).exp()
                 pull = (e + e * e * -(1 << BITS)) * n["steepness"] * (2 * n["depth"])
@@ -191,6 +179,10 @@ def _position(force: list[Series], m: int, unit: int, q: int, v: int) -> Series:
     return Series(rule, q, v)
 
 
+def _rate(x: Series, unit: int) -> Series:
+    return Series(lambda k: shifted((k + 1) * x[k + 1], -unit))
+
+
 def truth(scene: Scene, times: list[int]) -> list[tuple[list[int], list[int]]]:
     """q and p at rising |times| of one sign, in units of 2**-BITS."""
     m, q, p = ([whole(x) for x in xs] for xs in (scene.m, scene.q, scene.p))
@@ -201,7 +193,7 @@ def truth(scene: Scene, times: list[int]) -> list[tuple[list[int], list[int]]]:
         while done != end:
             force: list[list[Series]] = [[] for _ in m]
             u = [_position(force[i], m[i], unit, q[i], v[i]) for i in range(len(m))]
-            rates = [Series(lambda k, x=x: shifted((k + 1) * x[k + 1], -unit)) for x in u]
+            rates = [_rate(x, unit) for x in u]
             now = Series(lambda k: 0, shifted(done, unit), shifted(1 << BITS, unit))
             for i, one in forces(scene, u, rates, now):
                 force[i].append(one)
@@ -229,6 +221,7 @@ def value(x: list[int], h: int) -> int:
 
 def random(rng: np.random.Generator, kind: str) -> Scene:
     """A scene of a kind, with numbers over several decades, forwards or (1 of 8) backwards in time."""
+    laws: Any = terms
     m, k, size, b, c = (float(10 ** rng.uniform(-2, 2)) for _ in range(5))
     x, y, z, r = rng.normal(size=4) * size
     i, t = [0], math.sqrt(m / k)
@@ -237,25 +230,25 @@ def random(rng: np.random.Generator, kind: str) -> Scene:
     pair = {"m": [m, m, b, b], "q": [x, y, x + z, y + r], "p": p, "places": [0, 1, 3, 4]}
     both = {"a": [0, 1], "b": [2, 3], "number": [0, 0]}
     length, line = math.hypot(z, r), {"m": [m], "q": [x], "p": p[:1]}
-    spring = WallSpring(i=i, k=[k * rng.choice([1, 1, -1])], at=[y * rng.choice([0, 1])])
+    spring = laws.WallSpring(i=i, k=[k * rng.choice([1, 1, -1])], at=[y * rng.choice([0, 1])])
     near, deep = length * rng.uniform(0.5, 1.5), k * size**2
-    swing = Cosine(i=i, depth=[deep], wave=[1 / size], at=[y]), Damping(i=i, c=[0.1 * m / t])
-    brake = VanDerPol(i=i, c=[min(c, 9) * m / t], width=[size], at=[0.0])
-    tie = RadialSpring.to_points(i=[0, 1], at=[z, r], k=[k] * 2, rest=[size] * 2, number=[0, 0])
+    swing = laws.Cosine(i=i, depth=[deep], wave=[1 / size], at=[y]), laws.Damping(i=i, c=[0.1 * m / t])
+    brake = laws.VanDerPol(i=i, c=[min(c, 9) * m / t], width=[size], at=[0.0])
+    tie = laws.RadialSpring.to_points(i=[0, 1], at=[z, r], k=[k] * 2, rest=[size] * 2, number=[0, 0])
     bond = {"depth": [deep] * 2, "steepness": [1 / size] * 2, "rest": [near] * 2}
-    line_bond = Morse(a=[0], b=[1], depth=[deep], steepness=[1 / size], rest=[near])
-    terms: dict[str, tuple[dict[str, Any], tuple[Any, ...]]] = {
-        "quartic": (line, (spring, Quartic(i=i, b=[k / size**2], at=[0.0]))),
+    line_bond = laws.Morse(a=[0], b=[1], depth=[deep], steepness=[1 / size], rest=[near])
+    known: dict[str, tuple[dict[str, Any], tuple[Any, ...]]] = {
+        "quartic": (line, (spring, laws.Quartic(i=i, b=[k / size**2], at=[0.0]))),
         "pendulum": (line, swing),
-        "van-der-pol": (line, (WallSpring(i=i, k=[k], at=[0.0]), brake)),
+        "van-der-pol": (line, (laws.WallSpring(i=i, k=[k], at=[0.0]), brake)),
         "morse": ({"m": [m, b], "q": [0.0, length], "p": [p[0], -p[0]]}, (line_bond,)),
-        "elastic": (flat, (tie, Weight(i=[1], force=[-k * size], at=[0.0]))),
-        "bond": (pair, (RadialSpring(k=[k] * 2, rest=[near] * 2, **both),)),
-        "kepler": (pair, (Kepler(strength=[k * length**3] * 2, **both),)),
-        "lennard-jones": (pair, (LennardJones(depth=[deep] * 2, diameter=[0.63 * near] * 2, **both),)),
-        "radial-morse": (pair, (RadialMorse(**bond, **both),)),
+        "elastic": (flat, (tie, laws.Weight(i=[1], force=[-k * size], at=[0.0]))),
+        "bond": (pair, (laws.RadialSpring(k=[k] * 2, rest=[near] * 2, **both),)),
+        "kepler": (pair, (laws.Kepler(strength=[k * length**3] * 2, **both),)),
+        "lennard-jones": (pair, (laws.LennardJones(depth=[deep] * 2, diameter=[0.63 * near] * 2, **both),)),
+        "radial-morse": (pair, (laws.RadialMorse(**bond, **both),)),
     }
-    given, several = terms[kind]
+    given, several = known[kind]
     of_force = Scene(**given, terms=several, step=t, steps=1).system
     t = 1 / float(np.sqrt(np.max(of_force.gershgorin(of_force.q) / of_force.m)))
     steps = int(rng.integers(2, 2000))

@@ -199,7 +199,7 @@ class OnDistances(Distances):
         }  # fmt: skip
         cls.columns = (*cls.columns, NUMBER)
         name = f"{cls.__name__}ToPoints"
-        twin = dataclass(frozen=True, kw_only=True, eq=False)(type(name, (ToPoints,), own))
+        twin: Any = dataclass(frozen=True, kw_only=True, eq=False)(type(name, (ToPoints,), own))
         cls.to_points = twin
         # found there when a term goes to another process
         if module := sys.modules.get(cls.__module__):

@@ -169,7 +169,8 @@ def _of_distances(
     names = [c.field for c in term.columns if c.field not in (term.origin, "number")]
     for name in names:
         force.addPerBondParameter(name)
-    places, points = scene.all_places, []
+    points: list[tuple[float, ...]] = []
+    places = scene.all_places
     for first, last in itertools.pairwise([*term.firsts.tolist(), len(term)]):
         ends = [int(places[index[first]]) // 3 for index in term.particles]
         if term.bodies == 1:

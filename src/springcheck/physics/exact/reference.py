@@ -313,7 +313,8 @@ class ReferenceMotion(ClosedForm):
                 Path(self.system, unit, FEWER_STAGES, nudge=NUDGE),
             )
         one, other = self.paths[sign]
-        ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), *[np.zeros((1, self.n))] * 2))
+        none = np.zeros((1, self.n), np.longdouble)
+        ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), none, none))
         if ends[-1] >= end:
             return
         for path in (one, other):
