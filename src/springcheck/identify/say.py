@@ -29,6 +29,8 @@ OFFSET = {"semi-implicit-euler": -0.5, "semi-implicit-euler-drift-kick": 0.5, "l
 
 OR_UNKNOWN = ", or a scheme that is not known here"
 COMPARE = "compare the order of its stages and their coefficients with the scheme's"
+FEW_SUBSTEPS = 1 / 32
+"""Error of a share from which on it does not tell some substeps from many."""
 OF_AN_ERROR = 1e-3
 """Largest error of a stiffness that a step of high order may have."""
 UNITS = "look at the units of the force constant, and at whether V is k/2 q**2"
@@ -248,8 +250,9 @@ def _named(seen: Seen, found: Found) -> Identification:
         if scheme == HELD.scheme:
             whose = _held(first)
             if not whose and not fine:
+                vague = 12 * first.parts[0].g_error > FEW_SUBSTEPS
                 return Identification(
-                    verdict="not told apart", fits=True, **fields,
+                    verdict="not told apart", fits=not vague, undecided=vague, **fields,
                     statement=f"{title(scheme)}, of which there are many, or {OLD_FORCE}{steps}{hedge}",
                 )  # fmt: skip
             if not whose:
