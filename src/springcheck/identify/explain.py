@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from springcheck.identify.result import Identification
     from springcheck.identify.search import Seen
 
+MOST_PARTS = 6
+"""Largest n of a friction h k/(n m) that is the mark of a mistake."""
+
 COMPARE = "compare the order of its stages and their coefficients with the scheme's"
 
 
@@ -82,8 +85,8 @@ def explain(seen: Seen, again: Callable[[Record, Seen], Identification] | None) 
     shape = None if clean else limited(record, j) or (None if record.mixed else sine(record, j))
     if shape:
         return [shape]
-    if clean and seen.marked:
-        return [_marked(seen)]
+    if clean and (found := _marked(seen)):
+        return [found]
     if clean:
         if found := _solved(record, m):
             return [found]
@@ -102,12 +105,15 @@ def _solved(record: Record, m: Map) -> Explanation | None:
     return solved(m, record.jitter) if record.fine and m.size_left < SOLVED else None
 
 
-def _marked(seen: Seen) -> Explanation:
-    """A friction that is a multiple of h k/m: the mark of a step that is written down wrongly."""
-    x = seen.marked[0]
+def _marked(seen: Seen) -> Explanation | None:
+    """A friction that is a part of h k/m: the mark of a step that is written down wrongly."""
+    parts = [x for x in seen.marked if 1 <= round(x.parts[0].a / x.parts[0].g) <= MOST_PARTS]
+    if not parts:
+        return None
+    x = parts[0]
     rate = x.parts[0].g * x.stride / abs(float(seen.record.interval))
     share = round(x.parts[0].a / x.parts[0].g)
-    part = "h k/m" if share == 1 else f"h k/({share} m)" if share else "a multiple of h k/m"
+    part = "h k/m" if share == 1 else f"h k/({share} m)"
     cause = (
         f"{titles([x.row.scheme])} with a friction c/m = {rate:.6g} that was not stated and loses as much "
         f"area as {part}: the mark of a scheme that is written down wrongly, or of an implicit one"
