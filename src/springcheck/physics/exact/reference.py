@@ -1,4 +1,4 @@
-"""The reference solution of a smooth scene: integrated in extended precision, twice, with a stated error.
+"""The reference solution of a smooth scene: integrated in extended precision, with a stated error.
 
 Collocation at the nodes of Radau IIA, of order 39 with 20 stages (Hairer & Wanner, Solving ODEs II, IV.8).
 A step is the step of the scene times a power of 2, so that no time is rounded, and as long as the Legendre
@@ -6,10 +6,10 @@ series of the momenta just ends in rounding.  The stages are found by fixed-poin
 (Hairer, McLachlan & Razakarivony, BIT 48 (2008) 231), or by Newton's iteration where friction is stiff.
 States are sums with compensation.  Between the ends of steps the series gives every state.
 
-A second integration with fewer stages takes other steps, so that truncation and rounding differ.  It starts
-some roundings away, because both round the argument of a force alike, which near an unstable rest decides the
-motion.  The stated error is a multiple of the largest difference so far, plus other roundings that both
-share.
+Two more integrations have fewer stages, other steps, and random roundings more at every step, several times
+as large as those of the first.  So their differences from it grow as its errors do, also where one passage or
+an unstable rest decides them, and two do not vanish by chance.  The stated error is a multiple of the larger
+difference so far, plus the roundings of constants, which all share.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.system import System
 
 STAGES, FEWER_STAGES = 20, 16
-"""Stages of the integration that counts, and of the one that it is compared with."""
+"""Stages of the integration that counts, and of those that it is compared with."""
 NOISE = 32
 """Largest share of the last two Legendre coefficients of a step, in units of rounding."""
-NUDGE = 4 * EPS
-"""Relative change of the start of the second one, several roundings: it grows as they do."""
-FELT = 3
-"""The stated error in units of the largest difference of both integrations."""
+SEEDS = (1, 2)
+"""Integrations with fewer stages."""
+KICK = 2 * EPS
+"""Relative size of the roundings that these get at every step."""
+FELT = 1.5
+"""The stated error in units of the largest difference."""
 FELT_ROUNDING = 4 * EPS
 """The least stated error, relative to the largest size so far and to the time: roundings of the constants of
-a force are the same in both integrations."""
+a force are the same in all integrations."""
 MOST_ERROR = 1e-3
 """The largest stated error of a reference, relative to the motion."""
 REST = 2.0**-32
@@ -58,7 +60,7 @@ STIFF = 4.0
 MOST_STIFF = 32
 """Most coordinates for which it is."""
 PLACES = 8
-"""Points of each step at which both integrations are compared."""
+"""Points of each step at which integrations are compared."""
 BLOCK = 256
 """Steps that are compared at a time."""
 RULE_DIGITS = 50
@@ -149,21 +151,25 @@ class Path:
     `done` (j + 1,) are the ends of its steps, and `series` (j, s, n) the momenta within each.
     """
 
-    def __init__(self, system: System[Any], unit: float, stages: int, nudge: float = 0.0) -> None:
+    def __init__(self, system: System[Any], unit: float, stages: int, seed: int = 0, moving: int = 0) -> None:
+        """With a seed the first `moving` coordinates get random roundings more at every step."""
         self.system, self.rule, self.stages = system, rule(stages), stages
         self.m, self.q, self.p = wide(system.m), wide(system.q), wide(system.p)
-        # what rests exactly is not moved
-        moves = (self.p != 0) | (system.force(self.q, self.p) != 0)
-        # by signs of no pattern: a change of scale would leave directions as they are
-        signs = np.where(np.arange(system.n) * 2654435761 % 2**32 < 2**31, 1, -1)
-        away = 1 + np.where(moves, signs * np.longdouble(nudge), 0)
-        self.q, self.p = self.q * away, self.p * away[::-1]
+        # what rests exactly is not moved, nor is a clock
+        self.kicked = ((self.p != 0) | (system.force(self.q, self.p) != 0)) & (np.arange(system.n) < moving)
+        self.random = np.random.default_rng(seed) if seed else None
+        self._kick()
         self.q_rest, self.p_rest = np.zeros_like(self.q), np.zeros_like(self.p)
         self.unit, self.power, self.calls, self.patience = np.longdouble(unit), 0, 0, 0
         self.done, self.starts, self.series = [np.longdouble(0)], [self.q], list[Extended]()
         self.powers = list[int]()
         self.most = [np.abs(self.q), np.abs(self.p), *np.abs([self.p / self.m, 0 * self.q, 0 * self.q])]
         """The largest |q|, |p|, |q'|, |p'| and |q - q(0)| so far (n,)."""
+
+    def _kick(self) -> None:
+        if self.random:
+            signs = self.random.choice([-KICK, KICK], (2, len(self.m))).astype(np.longdouble) * self.kicked
+            self.q, self.p = self.q * (1 + signs[0]), self.p * (1 + signs[1])
 
     def _guess(self, power: int) -> Extended:
         """Momenta at the nodes of the next step."""
@@ -255,6 +261,7 @@ class Path:
             change = (h * self.p + (h * self.p_rest + change)) / self.m
             self.p, self.p_rest = _added(self.p, self.p_rest, h * (of.end[1] @ force + of.end[0] @ force))
         self.q, self.q_rest = _added(self.q, self.q_rest, change)
+        self._kick()
         most = (self.q, p, p / self.m, force, self.q - self.starts[0])
         self.most = [np.maximum(x, np.max(np.abs(y), axis=0)) for x, y in zip(self.most, most, strict=True)]
         self.series.append(series)
@@ -286,7 +293,7 @@ class ReferenceMotion(ClosedForm):
     def __init__(self, system: System[Any]) -> None:
         self.n = system.n
         super().__init__(system.beside(system.clocked))
-        self.paths: dict[int, tuple[Path, Path]] = {}
+        self.paths: dict[int, tuple[Path, ...]] = {}
         self.known: dict[int, tuple[Extended, Extended, Extended]] = {}
         """By direction in time: ends of steps (j,), and the largest errors of q and p up to these (j, n)."""
         self._reach(1, np.longdouble(system.scene.steps))
@@ -305,29 +312,28 @@ class ReferenceMotion(ClosedForm):
 
     @np.errstate(all="ignore")
     def _reach(self, sign: int, end: Any) -> None:
-        """Integrate up to a time in units of the step, and compare both integrations."""
+        """Integrate up to a time in units of the step, and compare."""
         if sign not in self.paths:
             unit = sign * self.system.scene.step
-            self.paths[sign] = (
-                Path(self.system, unit, STAGES),
-                Path(self.system, unit, FEWER_STAGES, nudge=NUDGE),
-            )
-        one, other = self.paths[sign]
+            others = (Path(self.system, unit, FEWER_STAGES, seed, self.n) for seed in SEEDS)
+            self.paths[sign] = (Path(self.system, unit, STAGES), *others)
+        one, *others = self.paths[sign]
         none = np.zeros((1, self.n), np.longdouble)
         ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), none, none))
         if ends[-1] >= end:
             return
-        for path in (one, other):
+        for path in self.paths[sign]:
             path.extend(end)
         done = np.array(one.done)
         inside = np.arange(1, PLACES + 1) / np.longdouble(PLACES)
         for j in range(len(ends) - 1, len(done) - 1, BLOCK):
             some = done[j : j + BLOCK + 1]
             places = (some[:-1, None] + np.diff(some)[:, None] * inside).ravel()
-            # the other one may end a little earlier
-            places = np.minimum(places, other.done[-1])
-            both = zip(one.at(places), other.at(places), strict=True)
-            apart = [np.abs(x - y)[:, : self.n].reshape(-1, PLACES, self.n).max(axis=1) for x, y in both]
+            # others may end a little earlier
+            places = np.minimum(places, min(other.done[-1] for other in others))
+            mine = np.stack(one.at(places))
+            off = np.max([np.abs(np.stack(other.at(places)) - mine) for other in others], axis=0)
+            apart = off[..., : self.n].reshape(2, -1, PLACES, self.n).max(axis=2)
             dq, dp = (np.concatenate([x, y]) for x, y in zip((dq, dp), apart, strict=True))
         dq, dp = (np.maximum.accumulate(x, axis=0) for x in (dq, dp))
         self.known[sign] = done, dq, dp
