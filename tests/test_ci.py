@@ -46,8 +46,13 @@ BUGS = [
     ("gym_907.py", "semi-implicit-euler", STATED, "not semi-implicit Euler, kick-drift, but explicit Euler"),
     ("f1tenth_52.js", "rk4", STATED, "not classical Runge-Kutta (RK4), but"),
     ("traer_2.js", "", STATED, "velocities would have to be 100 times as large"),
-    ("jorbit_85.py", "velocity-verlet", STATED.replace("0.1", "-0.1"), "each step is \\|h\\|, not h"),
-    ("maple_47.rs", "velocity-verlet", STATED, "velocity is that of half a step before"),
+    (
+        "jorbit_85.py",
+        "velocity-verlet",
+        STATED.replace("0.1", "-0.1"),
+        "velocities of all coordinates have the wrong sign",
+    ),
+    ("maple_47.rs", "velocity-verlet", STATED, "but for one kick of -0.00537 of the velocity at frame 100"),
     ("mujoco_warp_1662.py", "", f"{STATED} --friction 0.4", "implicit friction of the wrong sign"),
 ]
 
