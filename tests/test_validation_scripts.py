@@ -38,7 +38,6 @@ def test_every_script_is_ended_by_the_one_function_and_looks_at_its_command_line
 
 @pytest.mark.parametrize(
     ("name", "word"),
-    [("reference.py", "wrte")],
 )
 def test_a_word_that_names_nothing_is_one_line_with_status_2(
     name: str, word: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

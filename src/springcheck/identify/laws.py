@@ -193,6 +193,10 @@ def _tried(one: Law, z: Any, left: Any, w: Any, counted: float) -> tuple[float, 
     return (share, share * math.sqrt(rank + one.more), numbers, one) if spare > 2 and certain else None
 
 
+SINGLE = 2.0**-20
+"""Residuals up to which forces in single precision, or a sum of them in fixed point, may be their cause."""
+
+
 def _best(fitting: list[tuple[float, float, int, Law]], m: Map, counted: float, size: float) -> Explanation:
     least = min(fitting, key=lambda x: x[1])
     good = [x for x in fitting if x[0] <= 3 * least[1] / math.sqrt(x[2] + 2)] or [least]
@@ -246,9 +250,10 @@ def _none(left: Any, counted: float, size: float) -> Explanation:
             size,
             shown=False,
         )
+    coarse = ", forces in less than double precision" if size < SINGLE else ""
     return Explanation(
         f"Noise: what one map leaves over is irregular, {size:.1e} of the state's size, in {where}: a "
-        "thermostat, random kicks, or an iteration that stops early",
+        f"thermostat, random kicks{coarse}, or an iteration that stops early",
         "look for a thermostat, or a tolerance",
         size,
     )
