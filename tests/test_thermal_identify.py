@@ -677,7 +677,7 @@ def test_a_drift_before_the_kick_has_its_own_friction_and_temperature_beside_eul
         assert abs(float(value) - right) < 4 * float(error) < 0.5 * right
 
 
-@pytest.mark.parametrize("letters", ["BAOA", "BAOAB", "collisions"])
+@pytest.mark.parametrize("letters", ["BAOA", "BAOAB"])
 @pytest.mark.parametrize("kind", ["normal", "uniform", "signs"])
 def test_draws_that_are_not_normal_are_noted(letters: str, kind: str) -> None:
     """Draws of +-1 were uniform, and those of collisions were of no shape at all."""
