@@ -100,7 +100,7 @@ def test_states_in_single_precision_that_none_declares_are_said_to_be_so() -> No
 
     scene = scenefile.load_scene("spring-uneven")
     run = springcheck.simulate(scene, step)
-    assert "in single, explains every step" in said(scene, run)
+    assert "double arithmetic, stored in single, explains every step" in said(scene, run)
     declared = replace(run, arithmetic=Arithmetic(name="single", state=2.0**-24, force=2.0**-24))
     assert said(scene, declared) == ""
 

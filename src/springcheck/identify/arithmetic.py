@@ -16,10 +16,15 @@ from springcheck.identify.storage import BINARY, ROUNDING
 FIXED = 2.0**-33
 """Quantum of forces in fixed point, relative to the largest force, as GPU platforms have it."""
 
+MOST_DRAG = 40.0
+"""Drags over one step above which exp(-drag) is below every rounding."""
+
 
 def arithmetic(record: Record, found: Map, m: Match) -> str:
     """The arithmetic that explains every single frame by a hypothesis: "double", "single", the format of the
     file, or both; "" where none does."""
+    if m.row.damped and abs(m.g) > MOST_DRAG:
+        return ""  # a step that keeps no digit of a velocity tells of no drag, and roundings have no size
     s, b, z = m.stride, m.entries.reshape(2, 2), found.z
     a, g = np.array([m.a], np.longdouble), np.array([m.g], np.longdouble)
     ratio = float(found.size[1] / found.size[0])
