@@ -58,10 +58,7 @@ def test_a_method_of_which_nothing_could_tell_is_not_judged(
     assert main(arguments) == 2
     assert capsys.readouterr().out.startswith("NOT JUDGED")
     assert main(["report", str(tmp_path / "a.h5"), "-o", str(tmp_path / "a.html")]) == 0
-    assert (
-        "not judged: own:semi-implicit-euler: nothing that applied could tell"
-        in (tmp_path / "a.html").read_text()
-    )
+    assert "not judged" in (tmp_path / "a.html").read_text()
 
 
 def test_a_method_is_not_judged_by_facts_of_its_record_alone() -> None:

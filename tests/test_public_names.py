@@ -99,7 +99,7 @@ def test_what_is_shown_is_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     report = springcheck.run(spring, "own:euler", path="shown.h5")
     found = springcheck.identify(run, mass=1.0)
     assert repr(found) == "Identification(named: Explicit Euler: double arithmetic explains every step)"
-    assert str(found).startswith("the states: explicit-euler\n")
+    assert str(found).startswith("the states: explicit-euler, 1 step per frame\n")
     assert "  stiffness:              1\n" in str(found)
     assert repr(report).startswith("Report('spring', 1 method: ")
     assert len(repr(report)) < 100

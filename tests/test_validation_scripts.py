@@ -36,22 +36,6 @@ def test_every_script_is_ended_by_the_one_function_and_looks_at_its_command_line
             assert re.search(r"arguments\(__doc__|parse_args\(", text), path.name
 
 
-@pytest.mark.parametrize(
-    ("name", "word"),
-    [("reference.py", "wrte")],
-)
-def test_a_word_that_names_nothing_is_one_line_with_status_2(
-    name: str, word: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("sys.argv", [name, word])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(FOLDER / name), run_name="__main__")
-    assert ended.value.code == 2
-    said = capsys.readouterr().err.splitlines()
-    assert said[-1].startswith(f"{name}: ")
-    assert word in said[-1]
-
-
 def _imported(part: ast.stmt) -> list[str]:
     if isinstance(part, ast.ImportFrom):
         return [str(part.module).split(".")[0]]

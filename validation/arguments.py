@@ -56,7 +56,7 @@ def script(main: Callable[[], int | None]) -> NoReturn:
     except BaseException as error:
         # a library, or what ends files and processes, may call an interrupt an error of its own
         if interrupts.seen() or isinstance(error, KeyboardInterrupt) or _by_interrupt(error):
-            interrupts.say()
+            print("springcheck: interrupted", file=sys.stderr)
             sys.exit(interrupts.STATUS)
         missing = isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("springcheck")
         if missing or isinstance(error, SpringcheckError | OSError):

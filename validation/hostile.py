@@ -29,6 +29,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -491,7 +492,7 @@ def main() -> int:
         for i in range(given.files):
             rng = random.Random(f"{given.seed} {i}")
             kept = rng.choice(sorted(whole))
-            cases.append((f"{i} {kept}", lambda path, kept=kept, rng=rng: damaged(whole[kept], rng, path)))
+            cases.append((f"{i} {kept}", partial(damaged, whole[kept], rng)))
         for number, (label, make) in enumerate(cases):
             path = folder / "work" / f"{number}{Path(label).suffix or '.h5'}"
             make(path)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import mpmath as mp
 
@@ -41,7 +42,8 @@ def step(scheme: Scheme, x: mp.mpf) -> mp.matrix:
             a = coefficient(c) * x
             out = (mp.matrix([[1, 0], [-a, 1]]) if kind == "kick" else mp.matrix([[1, a], [0, 1]])) * out
         return out
-    motion, slopes = x * mp.matrix([[0, 1], [-1, 0]]), []
+    slopes: list[Any] = []
+    motion = x * mp.matrix([[0, 1], [-1, 0]])
     for row in scheme.a:
         inner = mp.eye(2)
         for c, k in zip(row, slopes, strict=False):

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.polynomial.legendre import Legendre, leggauss
 
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, by_identity
 from springcheck.physics.trajectory import NOT_KNOWN, Limits
 
 MISSED = 0.05
@@ -123,6 +123,7 @@ def size(x: Floats, *, uniform: bool = False) -> Statistic:
     return Statistic(sums=sums, law=law, limits=limits)
 
 
+@by_identity
 class Known(NamedTuple):
     """Numbers y (f, n) of the usual size 1 that are known before the draws, and what they are."""
 

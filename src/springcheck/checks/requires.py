@@ -116,7 +116,6 @@ _ALL = (
     Requirement("every-step", "every step recorded", _unless(
         lambda case: case.trajectory.every == 1 and len(case.trajectory.t) > 4,
         "states further apart than a step, or fewer than five, leave no draw to be told")),
-    Requirement("company", "two particles", _unless(lambda x: x.scene.n > 1, "there is one particle")),
     Requirement("two-frames", "two frames", _unless(
         lambda case: len(case.trajectory.t) > 1, "there is no second frame")),
     Requirement("solution", "a reference solution", _unsolved),

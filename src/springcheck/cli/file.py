@@ -22,7 +22,7 @@ from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 
-NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
+NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step|less than double precision"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

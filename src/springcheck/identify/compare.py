@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
 
 from springcheck.identify.catalogue import ORDER
 from springcheck.identify.guesses import STRONG, guesses
@@ -81,6 +80,8 @@ class Joint:
 
 def match(row: Row, found: Map, free: Freedom, strides: Iterable[int], *, far: bool = False) -> list[Match]:
     """Best fit of a row at each stride, by Gauss-Newton; with `far` those too that do not fit."""
+    from scipy.special import chdtri
+
     got = guesses(row, found, strides)
     strong = row.damped and abs(_area(found) - 1) > STRONG
     got = got if far or strong else _near(row, found, got)

@@ -193,6 +193,13 @@ def _tried(one: Law, z: Any, left: Any, w: Any, counted: float) -> tuple[float, 
     return (share, share * math.sqrt(rank + one.more), numbers, one) if spare > 2 and certain else None
 
 
+SINGLE = 2.0**-20
+"""Residuals up to which forces in single precision, or a sum of them in fixed point, may be their cause."""
+
+
+COARSE = "; forces in less than double precision may leave as much"
+
+
 def _best(fitting: list[tuple[float, float, int, Law]], m: Map, counted: float, size: float) -> Explanation:
     least = min(fitting, key=lambda x: x[1])
     good = [x for x in fitting if x[0] <= 3 * least[1] / math.sqrt(x[2] + 2)] or [least]
@@ -219,7 +226,8 @@ def _too_few(counted: float, size: float) -> Explanation:
         f"What one map leaves over, {size:.1e} of the state's size, stands in about {round(counted)} frames"
     )
     return Explanation(
-        f"{cause}: they do not show its cause; a solver that chooses its steps has no fixed scheme to find",
+        f"{cause}: they do not show its cause; a solver that chooses its steps has no fixed scheme to find"
+        + COARSE * (size < SINGLE),
         "",
         size,
         shown=False,
@@ -241,14 +249,15 @@ def _none(left: Any, counted: float, size: float) -> Explanation:
     if max(sums) * math.sqrt(len(left)) > 5:
         return Explanation(
             f"No known cause alone explains what one map leaves over, and it is no white noise: {size:.1e} "
-            f"of the state's size, in {where}",
+            f"of the state's size, in {where}" + COARSE * (size < SINGLE),
             "look for several errors at once; a solver that chooses its steps has no fixed scheme to find",
             size,
             shown=False,
         )
+    coarse = ", forces in less than double precision" if size < SINGLE else ""
     return Explanation(
         f"Noise: what one map leaves over is irregular, {size:.1e} of the state's size, in {where}: a "
-        "thermostat, random kicks, or an iteration that stops early",
+        f"thermostat, random kicks{coarse}, or an iteration that stops early",
         "look for a thermostat, or a tolerance",
         size,
     )

@@ -12,8 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.special import fdtri
 
 from springcheck.identify.record import Record
 from springcheck.identify.storage import ROUNDING
@@ -111,12 +109,16 @@ class Band:
         band[1, ::2] = block[:, 1, 0] / self.scale[:, 0] / self.scale[:, 1]
         band[1, 1:-1:2], band[2, :-2:2] = below[:, 0, 1], below[:, 0, 0]
         band[2, 1:-1:2], band[3, :-2:2] = below[:, 1, 1], below[:, 1, 0]
+        from scipy.linalg import cholesky_banded
+
         self.factor = cholesky_banded(band, lower=True)
         self.log_det = 2 * float(np.sum(np.log(self.factor[0])) + np.sum(np.log(self.scale)))
 
     def solve(self, x: Floats) -> Floats:
         """V**-1 x of columns (f - 1, 2, k)."""
         y = x / self.scale[:, :, None]
+        from scipy.linalg import cho_solve_banded
+
         solved = cho_solve_banded((self.factor, True), y.reshape(-1, x.shape[2]))
         return np.asarray(solved.reshape(x.shape) / self.scale[:, :, None])
 
@@ -223,6 +225,8 @@ def _scaled(record: Record, j: int) -> tuple[Any, Any]:
 
 def measure(record: Record, j: int, kept: Any = None, most: int = 2) -> Map:
     """The map of coordinate j from the pairs that are `kept` (f - 1,), with a constant of `most` numbers."""
+    from scipy.special import fdtri
+
     z, size = _scaled(record, j)
     pace = abs(float(record.interval))
     quanta = np.stack([record.dq[:, j] * record.coarse[0], record.dv[:, j] * pace * record.coarse[1]], 1)
