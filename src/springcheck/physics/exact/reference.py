@@ -315,8 +315,8 @@ class ReferenceMotion(ClosedForm):
         """Integrate up to a time in units of the step, and compare."""
         if sign not in self.paths:
             unit = sign * self.system.scene.step
-            others = (Path(self.system, unit, FEWER_STAGES, seed, self.n) for seed in SEEDS)
-            self.paths[sign] = (Path(self.system, unit, STAGES), *others)
+            again = (Path(self.system, unit, FEWER_STAGES, seed, self.n) for seed in SEEDS)
+            self.paths[sign] = (Path(self.system, unit, STAGES), *again)
         one, *others = self.paths[sign]
         none = np.zeros((1, self.n), np.longdouble)
         ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), none, none))
