@@ -147,6 +147,14 @@ def test_list_has_a_page_for_each_kind(capsys: pytest.CaptureFixture[str]) -> No
     assert {scene["name"] for scene in document(capsys)["scenes"]} == set(scenes.names())
 
 
+@pytest.mark.parametrize("scene", ["pendulum", "kepler"])
+def test_identify_with_a_scene_names_the_scheme_of_any_force(scene: str) -> None:
+    springcheck.simulate(springcheck.load_scene(scene), "own:rk4").save(Path("run.csv"))
+    done = [sys.executable, "-m", "springcheck", "identify", "run.csv", "--scene", scene]
+    ran = subprocess.run(done, capture_output=True, text=True, check=False)
+    assert ran.stdout.startswith("run.csv: rk4"), ran.stderr
+
+
 def test_cite_names_what_a_store_used(capsys: pytest.CaptureFixture[str]) -> None:
     main(["run", "spring", "--method", "own:euler", "--method", "openmm:verlet", "--quiet"])
     assert main(["cite", "spring.h5"]) == 0

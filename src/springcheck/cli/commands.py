@@ -218,15 +218,17 @@ def _look_on(
     scene: str, file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None]
 ) -> Any:
     """As `_look`, of a file of a scene, whose force is known."""
+    from springcheck import schemes
     from springcheck.cli import taken
     from springcheck.identify.steps import on_scene
     from springcheck.physics.scenefile import load_scene
 
+    schemes.bring(schemes.UNKNOWN)
     try:
         with output.readable(file):
             path, found = Path(file), load_scene(scene)
             states = taken.states_in(path, columns, stated["step"], trajectory)
-            judged, run, notes, _ = taken.as_trajectory(path, states, found, "unknown")
+            judged, run, notes, _ = taken.as_trajectory(path, states, found, schemes.UNKNOWN.name)
             return {path.name: on_scene(judged, run, notes)}, []
     except (SpringcheckError, OSError) as error:
         return error
