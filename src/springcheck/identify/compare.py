@@ -110,23 +110,25 @@ def match(row: Row, found: Map, free: Freedom, strides: Iterable[int], *, far: b
     with np.errstate(all="ignore"):
         # double precision leaves few hypotheses to extended precision
         for width, floor in ((np.float64, 1e-13), (np.longdouble, 0.0)):
+            # where long double is no wider, both passes have one type
+            coarse = floor > 0
             x = x.astype(width)
             size = np.max(sizes(row, x[0], x[1]).astype(float), axis=(1, 2))
             added = np.minimum(np.sqrt(np.abs(x[0].astype(float))) + np.abs(x[1].astype(float)), 1)
             whole = (row.roundings * added + 2) * s * np.maximum(size, 1) * largest * free.rounding
             weight = 1 / np.sqrt(values[:, None] + whole**2 + (floor * largest) ** 2)
             e, r = left(x, s, weight)
-            if free.scale and width is np.float64:
+            if free.scale and coarse:
                 x[2] = np.nan_to_num(np.log(np.abs(e[1] / seen[1] * seen[2] / e[2])) / 2, posinf=0, neginf=0)
                 e, r = left(x, s, weight)
             # few are given up once they are near
-            given_up = 99 if far or width is not np.float64 else 6 if strong else 2
+            given_up = 99 if far or not coarse else 6 if strong else 2
             kept, x, e, chi2, error = _gauss_newton(left, x, e, r, s, weight, which, given_up)
             s, turns = s[kept], turns[kept]
-            if width is np.float64 and far:
+            if coarse and far:
                 x, e = x.astype(np.longdouble), e.astype(np.longdouble)
                 break
-            if width is np.float64:
+            if coarse:
                 some = np.isfinite(chi2) & (chi2 < 1e4)
                 x, s, turns = x[:, some], s[some], turns[some]
                 if not len(s):
