@@ -26,13 +26,6 @@ def test_nothing_that_is_said_is_false(case: corpus.Case) -> None:
     assert corpus.judged(case, found) in ("right", "short", "refused"), str(found)
 
 
-@pytest.mark.campaign
-def test_of_all_cases_none_is_wrong_and_nearly_all_are_right() -> None:
-    judged = [corpus.judged(case, corpus.said(case)) for case in corpus.load()]
-    assert set(judged) <= {"right", "short", "refused"}
-    assert judged.count("right") >= RIGHT * len(judged)
-
-
 def test_every_case_states_how_its_truth_is_known_and_what_it_wants() -> None:
     cases = corpus.load()
     assert len(cases) > 500
