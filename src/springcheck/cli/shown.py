@@ -73,8 +73,8 @@ def other_scheme(scene: Scene, run: Trajectory, states: States) -> Verdict:
             for one in found.candidates:
                 names |= {one.scheme, *one.aliases}
             alike = run.scheme in names or is_step_of(scheme, names, scene, run)
-            # in single precision other schemes may fit as well by rounding of forces, which no row has
-            if not alike and states.roundoff >= 2.0**-24 and OR_UNKNOWN in found.statement:
+            # numbers of single precision may come of forces that were rounded to it, which no row has
+            if not alike and states.roundoff == 2.0**-24 and OR_UNKNOWN in found.statement:
                 return verdict(None, unread)
             # what has no name there is told by its own motion, below
             if alike or run.scheme in known_names() or not (alone or mixed):
