@@ -137,7 +137,7 @@ def test_every_finding_has_its_note_its_row_and_a_short_program() -> None:
             "Law",
             "Measured",
             "Where",
-            "What would mend it",
+            "Possible fix",
             "Does its tracker know",
         ):
             assert f"* **{part}**" in note, (script.stem, part)
