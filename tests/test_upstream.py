@@ -25,7 +25,7 @@ FOLDER = Path(__file__).parents[1] / "validation" / "upstream"
 NEEDS = {
     "ase": "ase", "cannon": "cannon-es", "dart": "dartpy", "jaxmd": "jax-md", "lammps": "mpich",
     "mujoco": "mujoco", "openmm": "openmm", "p2": "p2", "pybullet": "pybullet", "pymunk": "pymunk",
-    "rebound": "rebound",
+    "rebound": "rebound", "roadrunner": "libroadrunner",
 }  # fmt: skip
 
 STANDARD_ERRORS = 5
