@@ -17,7 +17,8 @@ context.setVelocities([(0, 0, 0), (0, 0, 0)])
 try:
     integrator.step(STEPS)
 except mm.OpenMMException as error:  # the CPU platform looks for NaN after each step
-    assert "NaN" in str(error)
+    if "NaN" not in str(error):
+        raise
     measured = 0
 else:
     x = context.getState(positions=True).getPositions(asNumpy=True)._value[0]
