@@ -85,8 +85,9 @@ HERE = ("ase", "openmm")
 
 def printed(script: str) -> str:
     """What a script prints, run in this process; skips where OpenMM has no OpenCL."""
-    with redirect_stdout(StringIO()) as out, warnings.catch_warnings():
+    with redirect_stdout(StringIO()) as out, warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
         warnings.simplefilter("ignore")
+        patch.setattr(sys, "argv", [script])
         try:
             runpy.run_path(script, run_name="__main__")
         except Exception as error:
