@@ -63,7 +63,7 @@ class Trajectory:
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rebuilds_velocity: bool = False
     off_axis: float | None = None
-    """Largest |y| or |z| seen, for engines in three dimensions."""
+    """Largest magnitude of y or z [L], for engines in three dimensions."""
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like, as needed to repeat the run."""
     scene: Scene | None = None
