@@ -32,7 +32,7 @@ from springcheck.text.wording import rounded_down
 
 LABELS = [
     str(label)
-    for label in engines.match(("*",))
+    for label in dict.fromkeys([*engines.match(("*",)), *engines.match(("own:*",), every=True)])
     if schemes.scheme(engines.method(label).scheme).has("one-step")
     and not engines.refusal(builders.spring(1, 1, 1, 0, 0.1, 1), label)
 ]
