@@ -209,7 +209,7 @@ def of_steps(
     names = {"stiffness": "spring", "friction": "friction"}
     blind = [count(hidden[name], noun) for name, noun in names.items() if hidden[name]]
     blind += ["the step"] * hidden["step"]
-    said = f"; {' and '.join(blind)} could be off by {LARGEST:.0%} and not be seen in a step" if blind else ""
+    said = f"; {' and '.join(blind)} wrong by {LARGEST:.0%} would not show in one step" if blind else ""
     return found, said
 
 
