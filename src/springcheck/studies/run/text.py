@@ -90,7 +90,11 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         *(
             plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
             for run in runs
-            if run.outcome != "complete" or run.message
+            if run.outcome != "complete"
+        ),
+        *(
+            plain(f"  {', '.join(run.method for run in runs if run.message == said)}: {said}")
+            for said in {run.message: None for run in runs if run.outcome == "complete" and run.message}
         ),
     ]
 
