@@ -178,7 +178,7 @@ def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(
                 monkeypatch.setattr(module, loop, watched)
 
     def by_index(terms: Any, *arguments: Any) -> None:
-        called.extend(key for key, rows in zip(loops.KINDS, terms, strict=False) if len(rows[0]))
+        called.extend(key for key, rows in zip(own_loops.KINDS, terms, strict=False) if len(rows[0]))
         indexed(terms, *arguments)
 
     indexed = own_loops.indexed

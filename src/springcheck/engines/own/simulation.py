@@ -4,9 +4,8 @@ numba is imported only for a run that is worth it (see `WORTH`).  The numbers ar
 to the last bit, so a machine without numba, or with a cache folder that cannot be written, gets them too.
 They do not depend on how the particles are cut into tiles, nor on the number of threads.
 
-A scene with a term that the loops do not have is carried through the same steps by NumPy.  A long run of it is
-carried out by the loops with the term's own slope compiled (`laws`), and an exponential may then differ by a
-rounding.
+A scene with a term that the loops do not have is carried through the same steps by NumPy.  In a long run the
+loops do it, with the term's own slope compiled (`laws`); an exponential may then differ by a rounding.
 """
 
 from __future__ import annotations
