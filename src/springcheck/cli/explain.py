@@ -141,7 +141,7 @@ def _term(term: Any) -> Iterator[str]:
         sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
         yield f"  {column.name}: {sign}{default}"
     why = why_not(term)
-    yield f"In long runs own methods compute it {f'by NumPy: not compiled ({why})' if why else 'compiled'}"
+    yield f"Long runs of own methods: {f'NumPy, not compiled ({why})' if why else 'compiled'}"
 
 
 def _method(name: str) -> Iterator[str]:

@@ -26,7 +26,7 @@ MOST_CHECKED = 64
 
 
 @cache
-def _slope(kind: type[Term]) -> tuple[Any, str]:
+def _slope(kind: Any) -> tuple[Any, str]:
     """The slope of a law as a compiled function of u, of its parameters (k, s), and of the row; or why it is
     not compiled."""
     import numba
@@ -54,7 +54,7 @@ def why_not(kind: type[Term]) -> str:
 
 
 @cache
-def _pull(kind: type[Term]) -> Any:
+def _pull(kind: Any) -> Any:
     """A pointer to a function that adds the force of a term's rows to f, from its `arrays`."""
     import numba
 
