@@ -45,7 +45,7 @@ def _slope(kind: Any) -> tuple[Any, str]:
         return None, f"numba: {why:.120}"
 
 
-def why_not(kind: type[Term]) -> str:
+def why_not(kind: Any) -> str:
     """Why a term is not compiled, in a clause; empty where it is."""
     try:
         return "" if kind.key in KINDS else _slope(kind)[1]
@@ -99,15 +99,17 @@ def arrays(term: Term) -> tuple[Integers, Integers, Floats]:
 
 def compiled(term: Term) -> tuple[Any, ...]:
     """A term as `loops.others` takes it, where `obstacle` has none."""
+    kind: Any = type(term)
     # numba warns of a pointer that comes first
-    return *arrays(term), _pull(type(term))
+    return *arrays(term), _pull(kind)
 
 
 def obstacle(term: Term, q: Floats) -> str:
     """Why a term is not compiled; empty where its compiled slope is NumPy's at q (n,), to rounding."""
-    if why := why_not(type(term)):
+    kind: Any = type(term)
+    if why := why_not(kind):
         return why
-    of, (_, _, x) = _slope(type(term))[0], arrays(term)
+    of, (_, _, x) = _slope(kind)[0], arrays(term)
     start = term.lengths(q) if isinstance(term, Distances) else term.elongation(q)
     for u in (start[:MOST_CHECKED], 1.25 * start[:MOST_CHECKED]):
         given = [x[: len(u)] for x in term.parameters]
