@@ -98,7 +98,7 @@ def play(
         if scripted and not method.scripted:
             raise MethodError(NO_NORMAL_NUMBERS)
         seed = seed if scripted else checked_seed(seed)
-        draws = f"{THERMOSTATS[method.scheme].fresh} a step and particle"
+        draws = f"{THERMOSTATS[method.scheme].fresh} per step and particle"
         kept = GIVEN_DRAWS if scripted else str(seed)
         origin = {"seed": kept, "generator": method.generator, "threads": "1", "draws": draws}
     elif seed is not None:

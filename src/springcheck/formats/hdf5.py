@@ -225,7 +225,7 @@ def _numbers(path: Path, group: Any, name: str) -> Any:
 def _axis(path: Path, group: Any, element: str, frames: int, kept: int) -> tuple[Floats, Floats]:
     """Times and steps of the first `kept` of so many frames; times where it has no steps."""
     if access.find(group, f"{element}/time") is None:
-        raise StoreError(f"{path}: {group.name}/{element} has no time: nothing can be told without it")
+        raise StoreError(f"{path}: {group.name}/{element} has no time, which is needed")
     there = ["time"] * 2 if access.find(group, f"{element}/step") is None else ["time", "step"]
     t, step = (_column(path, group, element, name, frames, kept) for name in there)
     return t, step

@@ -224,7 +224,7 @@ def faults(broken: Mapping[str, str], verdicts: Sequence[Verdict]) -> Lines:
     for method, about in broken.items():
         mine = [v for v in verdicts if v.method == method and v.passed is not None]
         seen = [v.check for v in mine if not v.passed]
-        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: nothing here sees it"
+        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: no check here detects it"
         out.append(plain(f"{method}, broken on purpose ({about}): {said}", "" if seen else "bold yellow"))
     return out
 
