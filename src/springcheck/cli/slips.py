@@ -90,7 +90,7 @@ def look(options: argparse.Namespace) -> None:
         if given.get(attribute) is not None:
             for option in unread:
                 if given.get("output" if option == "-o" else option[2:]):
-                    raise SpringcheckError(f"{option} is not read beside {called}: leave it out")
+                    raise SpringcheckError(f"{option} is not used with {called}: leave it out")
     if "rows" in given and given["rows"] is not None and given["trajectory"] is None:
         raise SpringcheckError("--rows is for the numbers of a trajectory: name one with --trajectory")
 

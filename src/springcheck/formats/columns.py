@@ -255,7 +255,7 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float 
     if mass is not None and np.any(mass != mass[:1]):
         raise StoreError(f"{path}: the masses change from row to row")
     left = [name for name in columns if kind(name) is not None and name not in meant]
-    said = "left out: a capital beside small letters is an energy or another quantity"
+    said = "left out: a capital letter among small ones is an energy or another quantity"
     return States(
         t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
         mass=None if mass is None else mass[0], notes=(f"{listed(left)} {said}",) if left else (),

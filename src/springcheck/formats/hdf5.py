@@ -177,7 +177,7 @@ def _roundoff(dataset: Any) -> float:
 def _times(group: Any, element: str, frames: int) -> Floats:
     """Times of the first frames; a scalar is a fixed interval (H5MD 1.1), with an optional offset."""
     if access.find(group, f"{element}/time") is None:
-        raise access.refuse(group, f"has no time of its {element}: nothing can be told without it")
+        raise access.refuse(group, f"has no time of its {element}, which is needed")
     dataset = _numbers(group, f"{element}/time")
     if dataset.ndim == 0:
         offset = access.attributes(dataset).get("offset", 0.0)
