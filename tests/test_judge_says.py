@@ -106,7 +106,7 @@ def test_ase_keeps_its_forces_for_motions_below_1e_15_and_the_verdict_says_so(ne
     scene = lone(1e-14)
     failed = [v for v in checks.judge(scene, springcheck.simulate(scene, LAZY)) if v.passed is False]
     (defect,) = (v for v in failed if v.check == "step-defect")
-    assert "forces are kept while no position moves by more than 1e-15" in defect.why
+    assert "forces are reused while no position moves by more than 1e-15" in defect.why
 
 
 def test_a_cell_of_the_atlas_is_judged_alone_where_company_would_refresh_its_force(need: Need) -> None:
@@ -116,7 +116,7 @@ def test_a_cell_of_the_atlas_is_judged_alone_where_company_would_refresh_its_for
     one, other = extremes.cells(engines.parse(LAZY), [large, small])
     assert one.outcome == "right"
     assert other.outcome == "engine's limit"
-    assert "forces are kept" in other.reason
+    assert "forces are reused" in other.reason
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
         patch.setattr(stability, "measure", interrupted)
         assert cli.main(arguments) == interrupts.STATUS
     assert capsys.readouterr().err == (
-        "springcheck: interrupted; what was finished is kept, the same command goes on\n"
+        "springcheck: interrupted; finished work is saved; the same command continues\n"
     )
     for command in ("plot", "report"):
         assert cli.main([command, str(tmp_path / "study.h5")]) == 2

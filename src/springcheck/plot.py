@@ -28,7 +28,7 @@ def position(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Ax
 @typed
 def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
     """Change of the total energy over time, relative to the kinetic plus the absolute potential energy of
-    the start, or where that is 0 to what the scene may gain; without a scene to |H0|.  Returns the axes.
+    the start, or where that is 0 to what the scene may gain; without a scene to ``|H0|``.  Returns the axes.
 
     SpringcheckError where a trajectory was recorded without energies.
     """

@@ -158,7 +158,7 @@ def _said(
     notes = _remarks(found, numbers, stated, named=named, joined=joined)
     rates = [one.candidates[0] for one in found if best and one.candidates]
     if rates and all(y.friction <= ERRORS * y.friction_error for y in rates):
-        statement += "; no friction shows: random kicks without one would do as well in so few frames"
+        statement += "; no friction shows: random kicks without friction fit so few frames equally"
     if against:
         statement = f"{statement}, but of {', '.join(against)}"
     only = candidates[0] if named else None

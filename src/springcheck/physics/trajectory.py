@@ -63,7 +63,7 @@ class Trajectory:
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rebuilds_velocity: bool = False
     off_axis: float | None = None
-    """Largest |y| or |z| seen, for engines in three dimensions."""
+    """Largest magnitude of y or z [L], for engines in three dimensions."""
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like, as needed to repeat the run."""
     scene: Scene | None = None
@@ -92,7 +92,7 @@ class Trajectory:
         inconsistent.
         """
         if p is None and v is None:
-            raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
+            raise SpringcheckError(f"{label}: momenta p or velocities v= are needed with t and q")
         m, every = (mass, every) if scene is None else (scene.m if mass is None else mass, scene.every)
         if p is None and m is None:
             raise SpringcheckError(f"{label}: velocities make momenta with mass= or scene=")
@@ -298,31 +298,31 @@ class Comparison:
 class Limits:
     """The relative change of each quantity from which on a check fails; None where the check is blind."""
 
-    stiffness: float | None = told("a stiffness off by {:.1e}")
+    stiffness: float | None = told("stiffness {:.1e}")
     """Relative change of the spring, or other potential's row, with the largest such limit."""
-    step: float | None = told("a step off by {:.1e}")
-    friction: float | None = told("a friction off by {:.1e}")
+    step: float | None = told("step {:.1e}")
+    friction: float | None = told("friction {:.1e}")
     """Relative change of the friction on one particle."""
-    area: float | None = told("an area in phase space off by {:.1e} a step")
+    area: float | None = told("phase-space area per step {:.1e}")
     """Relative change of every particle's phase-space area a step: its momentum is multiplied by 1 + x."""
-    reaction: float | None = told("a force off its reaction by {:.1e}")
+    reaction: float | None = told("reaction {:.1e}")
     """Relative excess of the force on one particle over its reactions on the others."""
-    order: float | None = told("an order or exponent off by {:.1e}")
+    order: float | None = told("order or exponent {:.1e}")
     """Absolute change of an order or an exponent."""
-    amplitude: float | None = told("a drive's amplitude off by {:.1e}")
+    amplitude: float | None = told("amplitude of a drive {:.1e}")
     """Relative change of a drive's amplitude: the largest such limit."""
-    frequency: float | None = told("its frequency off by {:.1e}")
+    frequency: float | None = told("frequency of a drive {:.1e}")
     """Relative change of the frequency of a drive."""
-    phase: float | None = told("its phase off by {:.1e} rad")
+    phase: float | None = told("phase of a drive {:.1e} rad")
     """Change of the phase of a drive, in radians."""
-    late: float | None = told("a drive late by {:.1e} of a step")
+    late: float | None = told("delay of a drive {:.1e} steps")
     """Delay of a drive, in steps."""
-    temperature: float | None = told("noise of a temperature off by {:.1e}")
+    temperature: float | None = told("noise temperature {:.1e}")
     """Relative change of the temperature of a bath's noise, seen in 19 runs of 20."""
 
     def __str__(self) -> str:
         """The limits in words; "" where all are None."""
-        return f"would see {said}" if (said := worded(self)) else ""
+        return f"smallest detectable errors: {said}" if (said := worded(self)) else ""
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:
@@ -369,7 +369,7 @@ class Verdict:
         """The reason, and the smallest faults that the check would have detected."""
         # what is identified is known to the digits of the states
         counted = self.bound == 0 and self.check != "identified"
-        exact = "would see any other value" if self.passed and counted else ""
+        exact = "any other value would fail" if self.passed and counted else ""
         return "; ".join(filter(None, (self.why, str(self.sees) or exact)))
 
     def __repr__(self) -> str:

@@ -90,7 +90,11 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         *(
             plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
             for run in runs
-            if run.outcome != "complete" or run.message
+            if run.outcome != "complete"
+        ),
+        *(
+            plain(f"  {', '.join(run.method for run in runs if run.message == said)}: {said}")
+            for said in {run.message: None for run in runs if run.outcome == "complete" and run.message}
         ),
     ]
 
@@ -233,7 +237,7 @@ def faults(broken: Mapping[str, str], verdicts: Sequence[Verdict]) -> Lines:
     for method, about in broken.items():
         mine = [v for v in verdicts if v.method == method and v.passed is not None]
         seen = [v.check for v in mine if not v.passed]
-        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: nothing here sees it"
+        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: no check here detects it"
         out.append(plain(f"{method}, broken on purpose ({about}): {said}", "" if seen else "bold yellow"))
     return out
 

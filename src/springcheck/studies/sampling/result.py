@@ -24,7 +24,7 @@ TITLES = ("method", "configurational", "law", "kinetic", "law ", "limit", "law  
 
 CAPTION = (
     "Temperatures over the bath's at h omega = 0.5 and friction 0.4 omega; the largest stable h omega at",
-    "friction omega, rounded down.  Each beside its law.",
+    "friction omega, rounded down.  Each with its law.",
 )
 
 W_SIGN, SQUARED = "\N{GREEK SMALL LETTER OMEGA}", "\N{SUPERSCRIPT TWO}"
