@@ -117,7 +117,8 @@ def play(
     q, p = np.full((2, rows, scene.n), UNTOUCHED)
     _hand_over(scene, sink, 0, scene.q[None], scene.p[None])
     run_seconds = 0.0
-    outcome = Outcome(status="complete", step=scene.steps)
+    note = str(getattr(simulation.simulation, "note", ""))
+    outcome = Outcome(status="complete", step=scene.steps, message=note)
     frame, calls = 1, 0
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)

@@ -14,6 +14,7 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.bath import THERMOSTATS, Law
 from springcheck.checks.seeds import SEEDED
+from springcheck.engines.own.laws import why_not
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
 from springcheck.schemes import Scheme
@@ -139,6 +140,8 @@ def _term(term: Any) -> Iterator[str]:
         default = "" if column.default is None else f", {column.default:g} by default"
         sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
         yield f"  {column.name}: {sign}{default}"
+    why = why_not(term)
+    yield f"Long runs of own methods: {f'NumPy, not compiled ({why})' if why else 'compiled'}"
 
 
 def _method(name: str) -> Iterator[str]:

@@ -105,7 +105,7 @@ class Simulation(Protocol):
     """A started engine.  It advances and does nothing else: the driver records, times and judges.
 
     An engine in three dimensions may have an attribute `off_axis`, the largest magnitude of a coordinate
-    along axes that the scene leaves out.
+    along axes that the scene leaves out.  A text `note` becomes the message of a complete run.
     """
 
     @property

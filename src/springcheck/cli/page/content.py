@@ -45,7 +45,7 @@ def sections(summary: Summary) -> tuple[list[dict[str, Any]], dict[str, Any], St
             first = next((i for i, line in enumerate(blocks) if isinstance(line, TextTable)), len(blocks))
             tables = blocks[first:]
             continue
-        mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(study.banks(result))}
+        mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(result.banks())}
         data |= mine
         title = study.about[:1].upper() + study.about[1:]
         found.append({"name": study.name, "title": title, "blocks": blocks, "banks": list(mine)})
