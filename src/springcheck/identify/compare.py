@@ -165,7 +165,7 @@ def _matches(
                 seen = trial.seen
                 x[2] = np.nan_to_num(np.log(np.abs(e[1] / seen[1] * seen[2] / e[2])) / 2, posinf=0, neginf=0)
             # few are given up once they are near
-            given_up = np.where(trial.strong[r], 6, 2) if coarse and not far else np.full(len(r), 99)
+            given_up = np.where(trial.strong[r], 4, 2) if coarse and not far else np.full(len(r), 99)
             kept, x, e, chi2, error = _gauss_newton(trial, r, x, s, weight, given_up)
             r, s, turns = r[kept], s[kept], turns[kept]
             if coarse and far:
@@ -204,7 +204,7 @@ def _gauss_newton(
     trial: _Trial, r: Any, x: Any, s: Any, weight: Any, given_up: Any
 ) -> tuple[Any, Any, Any, Floats, Floats]:
     """Minimise the residuals over the free numbers: which are left, x (3, c), entries, chi-squared (c,) and
-    errors (3, c).  At the round `given_up` (c,) those are that do not converge."""
+    errors (3, c).  From the round `given_up` (c,) on those are that do not converge."""
     free = np.stack([np.ones(len(r), bool), trial.table.free[r], np.full(len(r), trial.free.scale)])
     which = [k for k in range(3) if np.any(free[k])]
     e, res = trial.left(r, x, s, weight)
@@ -246,7 +246,7 @@ def _gauss_newton(
         b = j[better]
         x[:, b], e[:, b], res[:, b], chi2[b] = moved[:, better], e2[:, better], res2[:, better], new[better]
         # what does not converge by then does not fit
-        lost = (given_up[j] == i + 1) & ~((chi2[j] < FAR_OFF) | (chi2[j] < SLOW * before))
+        lost = (given_up[j] <= i + 1) & ~((chi2[j] < FAR_OFF) | (chi2[j] < SLOW * before))
         alive[j[lost]] = False
         going = j[((gain > 1e-5) | again) & ~lost]
     return np.flatnonzero(alive), x[:, alive], e[:, alive], chi2[alive], error[:, alive]

@@ -18,6 +18,9 @@ FEW = 13
 STRONG, FOLD, FOLD_DAMPED = 0.02, 0.02, 0.2
 """Loss from which a friction is strong, and how far beyond an extremum of its curve a row is tried."""
 
+ALIKE = 0.05
+"""Relative difference of the numbers of two guesses that are tried as one."""
+
 
 def _roots(found: Map, strides: Sequence[int], exact: bool) -> list[tuple[int, int, float, float]]:
     """Every possible step: number in a frame, whole turns between frames, 2 - trace/sqrt(det), log det; the
@@ -91,7 +94,19 @@ def guesses(table: Table, found: Map, strides: Sequence[int]) -> tuple[Any, Floa
             each = np.flatnonzero(table.damped & usual)
             rows.append(np.repeat(each, len(strong)))
             out.append(np.tile(strong, (len(each), 1)))
-    return np.concatenate(rows), np.concatenate(out)
+    r, got = np.concatenate(rows), np.concatenate(out)
+    return _unlike(r, got)
+
+
+def _unlike(r: Any, got: Floats) -> tuple[Any, Floats]:
+    """One of guesses that lie so near each other that they lead to one solution."""
+    key = (r * 128 + got[:, 0].astype(int)) * 64 + got[:, 1].astype(int)
+    for x in got[:, 2:].T:
+        with np.errstate(all="ignore"):
+            size = np.clip(np.nan_to_num(np.rint(np.log(np.abs(x)) / ALIKE), neginf=-999), -999, 999)
+        key = key * 4096 + 2048 + np.where(x < 0, -1, 1) * (1000 + size).astype(int)
+    first = np.sort(np.unique(key, return_index=True)[1])
+    return r[first], got[first]
 
 
 def _is_flow(row: Any) -> bool:
