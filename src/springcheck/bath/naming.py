@@ -232,7 +232,7 @@ def _are_draws(x: Floats, z: Floats) -> bool:
 
 
 def _follows(x: Floats, z: Floats) -> bool:
-    """Whether what a map leaves, x (f,), follows from the states z (f, 2), as of a force that is not linear."""
+    """Whether what a map leaves, x (f,), follows from the states z (f, 2)."""
     from scipy.spatial import cKDTree
 
     each = z / np.std(z, axis=0)

@@ -37,7 +37,9 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, **stated: Any) -> Identif
 
     The stated `stiffness`, `friction` c and `step` are compared with what each scheme implies.
     """
-    positions, moving = (np.reshape(np.asarray(x, np.float64), (len(t), -1)) for x in (q, p if v is None else v))
+    positions, moving = (
+        np.reshape(np.asarray(x, np.float64), (len(t), -1)) for x in (q, p if v is None else v)
+    )
     if len(t) < FEWEST or positions.shape[1] > MOST:
         return None
     m = np.broadcast_to(1.0 if mass is None else np.ravel(np.asarray(mass, np.float64)), positions.shape[1:])
@@ -47,6 +49,8 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, **stated: Any) -> Identif
     except IdentificationError:
         return None
     velocities = moving / m if v is None else moving
+    if _joined(positions, velocities):
+        return None
     each = [_of_digits(x, u, h) for x, u in zip(positions.T, velocities.T, strict=True)]
     if any(one is None for one in each):
         return None
@@ -58,8 +62,23 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, **stated: Any) -> Identif
     if not rows:
         return None
     only = named(found[0])
-    alone = only is not None and all((x := named(one)) is not None and x.scheme == only.scheme for one in found)
+    alone = only is not None and all(
+        (x := named(one)) is not None and x.scheme == only.scheme for one in found
+    )
     return _said(rows, only.scheme if alone and only else None, h, None if mass is None else m, stated)
+
+
+def _joined(q: Any, v: Any) -> bool:
+    """Whether what a coordinate's own map leaves of its velocity depends on the positions of others."""
+    for j in range(q.shape[1]):
+        known = np.column_stack([q[:-1, j], v[:-1, j], np.ones(len(q) - 1)])
+        both = np.column_stack([v[1:, j], np.delete(q, j, axis=1)[:-1]])
+        left, *others = (both - known @ np.linalg.lstsq(known, both, rcond=None)[0]).T
+        sizes = [float(np.linalg.norm(x) * np.linalg.norm(left)) for x in others]
+        alike = (abs(float(x @ left)) / size for x, size in zip(others, sizes, strict=True) if size)
+        if max(alike, default=0.0) > SURE / math.sqrt(len(left)):
+            return True
+    return False
 
 
 def _of_digits(q: Any, v: Any, h: float) -> list[Fitted] | None:

@@ -91,7 +91,7 @@ FAR_OFF, SLOW = 1e7, 0.2
 
 
 class _Trial:
-    """The guesses of all rows of a table against one map: each column has its row, steps, and free numbers."""
+    """The guesses of all rows of a table against one map: of each its row, steps, and free numbers."""
 
     def __init__(self, table: Table, found: Map, free: Freedom, far: bool) -> None:
         self.table, self.free, self.far = table, free, far

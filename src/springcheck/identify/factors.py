@@ -61,7 +61,7 @@ def of_velocities(seen: Seen, x: Joint) -> str:
     room = 1e-6 + 6 * (part.scale_error + part.a_error / abs(part.a)) + record.jitter
 
     def near(size: float, stiffness: float, *, stated: bool = False) -> bool:
-        """Whether scale and stiffness are these; where no stiffness is stated, as is needed if `stated`, any."""
+        """Whether scale and stiffness are these; any where none is stated, but for `stated`."""
         other = not stated if math.isnan(stiffer) else abs(stiffer / stiffness - 1) <= room
         return abs(scale / size - 1) <= room and other
 
@@ -79,7 +79,7 @@ def of_velocities(seen: Seen, x: Joint) -> str:
         (near(h, h**-2, stated=True),
          "position and momentum move by v and F, not by h v and h F: the step is left out", False),
         (near(h, 1 / h, stated=True), "the position moves by v, not by h v: the step is left out", False),
-        (near(1 / h, h, stated=True), "the position moves by h**2 v, not by h v: the step enters twice", False),
+        (near(1 / h, h, stated=True), "the position moves by h**2 v: the step enters twice", False),
         (near(h, 1), "velocities are multiplied by the step: they are displacements", True),
         (near(1 / h, 1), "velocities are divided by the step", True),
         (near(scale, scale**-2, stated=True) and abs(scale - 1) > 1e-2,

@@ -105,7 +105,9 @@ class Table:
         m[0] = m[3] = 1
         for some in _where(self._rational[i]):
             k = i[some]
-            m[:, some] = _rational(n.over[:, k], n.under[:, k], a[some], np.where(self._in_force[k], g[some], 0))
+            m[:, some] = _rational(
+                n.over[:, k], n.under[:, k], a[some], np.where(self._in_force[k], g[some], 0)
+            )
         for some in _where(self._length[i] > 0):
             k, x, y = i[some], a[some], g[some]
             q, v = m[:2, some], m[2:, some]
