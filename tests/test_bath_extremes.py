@@ -67,7 +67,7 @@ def test_a_right_thermostat_passes_however_far_its_numbers_are(label: str, given
 def test_an_engine_that_takes_its_forces_again_is_not_judged_by_its_draws_and_says_why() -> None:
     where = scene(thermal=1e-60)
     verdicts = checks.judge(where, driver.run(where, "ase:langevin-baoab", seed=5))
-    assert any("forces are kept while no position moves" in v.why for v in verdicts)
+    assert any("forces are reused while no position moves" in v.why for v in verdicts)
 
 
 def seeded(where: Scene, label: str, seed: int) -> Seeded:

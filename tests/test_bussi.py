@@ -69,7 +69,7 @@ def test_momenta_of_zero_are_refused_and_all_else_passes(label: str) -> None:
         "noise-direction",
         "noise-size",
     }
-    with pytest.raises(engines.MethodError, match="those of the start are all 0"):
+    with pytest.raises(engines.MethodError, match="all initial momenta are 0"):
         driver.run(replace(scene, p=np.zeros(3)), label, seed=4)
 
 

@@ -271,7 +271,7 @@ def test_a_step_off_is_the_engine_s_limit_only_where_that_explains_every_step_th
     (verdict,) = checks.judge(scene, run, [checks.step_defect])
     first = int(np.argmax(force >= limit)) + 1
     assert verdict.passed is False
-    assert f"step {first}, the first that is off, has a force of {force[first - 1]:.3g}" in verdict.why
+    assert f"step {first}, the first that is wrong, has a force of {force[first - 1]:.3g}" in verdict.why
     p = run.p.copy()
     p[int(np.argmin(force[1:-1])) + 2] *= 1 + 1e-12
     (verdict,) = checks.judge(scene, replace(run, p=p), [checks.step_defect])

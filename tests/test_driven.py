@@ -206,7 +206,7 @@ def sentence(scene: Scene, run: Any) -> str:
 
 MISPLACED = {
     "late-drive": "of a step later than velocity Verlet takes it",
-    "held-drive": "held over it, where velocity Verlet takes it at the start and the end",
+    "held-drive": "used throughout, where velocity Verlet takes it at the start and the end",
     "drive-of-the-step-before": "the start of the step before and the start of the step where velocity",
     "drive-phase": "the phase of the drive has the wrong sign",
     "drive-over-mass": "the amplitude of the drive is divided by the mass",
@@ -304,7 +304,7 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     else:
         run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
     why = sentence(scene, run)
-    assert (said in why) if said else ("What the states show: the drive" not in why)
+    assert (said in why) if said else ("Diagnosis: the drive" not in why)
 
 
 def ours(q: Any, p: Any, h: float, force: Any, mass: Any) -> tuple[Any, Any]:
@@ -326,7 +326,7 @@ def test_a_function_is_told_the_time_and_judged_by_where_it_takes_it() -> None:
     right, wrong = (springcheck.simulate(scene, f"stepper:{name}") for name in ("ours", "forgetful"))
     assert right.scheme == wrong.scheme == "velocity-verlet"
     assert not [v for v in checks.judge(scene, right) if v.passed is False]
-    assert "the start of the step, held over it" in sentence(scene, wrong)
+    assert "the start of the step, used throughout" in sentence(scene, wrong)
 
 
 @pytest.mark.parametrize("label", ["scipy:radau", "scipy:dop853", "sundials:adams", "sundials:bdf"])
@@ -398,9 +398,7 @@ def test_openmm_with_its_time_held_over_a_step_of_four_stages_is_told(need: Any)
         states.append((state.getPositions()[0][0]._value, 3.7 * state.getVelocities()[0][0]._value))
     q, p = np.array(states).T[:, :, None]
     run = steppers.trajectory(scene, schemes.SCHEMES["rk4"], q, p)
-    assert "the start of the step, held over it, where classical Runge-Kutta (RK4) takes it at" in sentence(
-        scene, run
-    )
+    assert "the start of the step, used throughout, where classical Runge-Kutta (RK4)" in sentence(scene, run)
 
 
 HALF_A_TURN = (3.7 * ((2 - 1e-12) / 0.1) ** 2, 0.0, 31.41592, 0.1)
@@ -503,7 +501,7 @@ def test_eigenvalues_that_nearly_meet_have_no_closed_form_here_and_blame_nobody(
     found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert [v for v in found.values() if v.passed is False] == []
     assert found["step-defect"].passed is True
-    assert "neither turns nor grows" in found["closed-form"].why
+    assert "neither oscillates nor grows" in found["closed-form"].why
 
 
 def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() -> None:
@@ -512,7 +510,7 @@ def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() ->
         checks.Case(trajectory=rest(scene, schemes.SCHEMES["velocity-verlet"]), scene=scene)
     )
     assert found.passed is None
-    assert "neither turns nor grows" in found.why
+    assert "neither oscillates nor grows" in found.why
 
 
 def test_the_check_of_the_drive_holds_its_tongue_where_the_spring_is_wrong() -> None:

@@ -316,7 +316,7 @@ def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
     run = springcheck.simulate(scene, label)
     (verdict,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
     assert verdict.passed is False
-    assert f"overflows beyond 2**31, and step {step}, the first that is off" in verdict.why
+    assert f"overflows beyond 2**31, and step {step}, the first that is wrong" in verdict.why
     before = replace(
         run,
         t=run.t[:step],

@@ -191,7 +191,7 @@ def test_leaps_of_unlike_length_are_of_no_box_and_show_no_order() -> None:
     found = identify_stepper(step)
     assert (found.scheme, found.fits) == (None, False)
     assert not found.statement.startswith("The positions are wrapped")
-    assert "its error on a quartic well does not fall as a power of the step: no order is seen" in found.notes
+    assert any("no order is measured" in note for note in found.notes)
 
 
 def first_mass(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:

@@ -346,4 +346,4 @@ def test_ctrl_c_of_a_caller_in_python_is_one_line(
 
     monkeypatch.setattr(listing, "listing", stopped)
     assert cli.main(["list"]) == interrupts.STATUS
-    assert capsys.readouterr().err == "springcheck: interrupted; nothing is kept\n"
+    assert capsys.readouterr().err == "springcheck: interrupted; nothing was saved\n"

@@ -252,6 +252,16 @@ def test_joined_masses_that_decay_below_every_double_are_followed() -> None:
     assert alarms(checks.judge(scene, run)) == []
 
 
+@pytest.mark.parametrize(("q", "h"), [(5.3553606e-316, 11576.740478577825), (4.6e-320, 11600.0)])
+def test_a_subnormal_motion_by_long_steps_passes(q: float, h: float) -> None:
+    """A drift by h p/m multiplies the last unit of a subnormal momentum by 11,600."""
+    scene = replace(
+        springcheck.load_scene("spring"), q=np.array([q]), p=np.zeros(1), step=h, steps=40, every=1,
+        quantities=("q", "p"),
+    )  # fmt: skip
+    assert alarms(checks.judge(scene, springcheck.simulate(scene, "own:velocity-verlet"))) == []
+
+
 @pytest.mark.parametrize("label", ["own:trapezoidal", "own:implicit-euler", "own:implicit-midpoint"])
 @pytest.mark.parametrize("h", [1e17, 9.2e18, 1e50, 1e150])
 def test_implicit_steps_beyond_the_digits_of_a_double_are_not_judged(label: str, h: float) -> None:

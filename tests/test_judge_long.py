@@ -98,7 +98,7 @@ def test_pieces_alone_pass_nothing_where_no_closed_form_joins_them(
     assert report.status == 2
     assert report.not_judged == ("own:plain",)
     (why,) = {v.why for v in report.verdicts if v.check == "step-defect"}
-    assert "no closed form tells what happened between them" in why
+    assert "no formula covers the steps between them" in why
 
 
 @pytest.mark.usefixtures("small")

@@ -22,7 +22,8 @@ from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Quartic, WallSpring
-from springcheck.studies.extremes import grid, running
+from springcheck.studies.extremes import grid
+from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.run import measure
 
 Need = Callable[[str], None]
@@ -105,17 +106,17 @@ def test_ase_keeps_its_forces_for_motions_below_1e_15_and_the_verdict_says_so(ne
     scene = lone(1e-14)
     failed = [v for v in checks.judge(scene, springcheck.simulate(scene, LAZY)) if v.passed is False]
     (defect,) = (v for v in failed if v.check == "step-defect")
-    assert "forces are kept while no position moves by more than 1e-15" in defect.why
+    assert "forces are reused while no position moves by more than 1e-15" in defect.why
 
 
 def test_a_cell_of_the_atlas_is_judged_alone_where_company_would_refresh_its_force(need: Need) -> None:
     need("ase:velocity-verlet")
     large = grid.Spec(block="size", m=3.7, k=2.9, q=0.3, p=0.7, h=0.1, steps=20)
     small = replace(large, q=3e-15, p=7e-15)
-    one, other = running.cells(engines.parse(LAZY), [large, small])
+    one, other = extremes.cells(engines.parse(LAZY), [large, small])
     assert one.outcome == "right"
     assert other.outcome == "engine's limit"
-    assert "forces are kept" in other.reason
+    assert "forces are reused" in other.reason
 
 
 @pytest.mark.parametrize(

@@ -138,11 +138,11 @@ def test_of_the_pieces_of_a_run_the_one_that_sees_most_counts() -> None:
     (found,) = checks.worst([[verdict(stiffness=3e-13)], [verdict(stiffness=1e-14, step=2e-9)]])
     assert found.sees == Limits(stiffness=1e-14, step=2e-9)
     assert Limits.least([]) == NOT_KNOWN
-    assert str(found.sees) == "would see a stiffness off by 1.0e-14, a step off by 2.0e-09"
+    assert str(found.sees) == "smallest detectable errors: stiffness 1.0e-14, step 2.0e-09"
     assert str(NOT_KNOWN) == ""
-    assert "an area in phase space off by 3.0e-15 a step" in verdict(area=3e-15).reason
+    assert "phase-space area per step 3.0e-15" in verdict(area=3e-15).reason
     exact = replace(verdict(), bound=0.0)
-    assert exact.reason == "would see any other value"
+    assert exact.reason == "any other value would fail"
 
 
 def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -153,7 +153,7 @@ def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
     found = [v for v in store.verdicts(path) if v.check == "step-defect"]
     assert all(v.sees.stiffness is not None and v.sees.stiffness < 1e-13 for v in found)
     assert main(["inspect", str(path), "--verdicts"]) == 0
-    assert "would see a stiffness off by" in capsys.readouterr().out
+    assert "smallest detectable errors: stiffness" in capsys.readouterr().out
     assert main(["inspect", str(path), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     sees = {v["check"]: v["sees"] for v in shown["verdicts"]}

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from springcheck import driver
-from springcheck.engines.own import kernels, layout
+from springcheck.engines.own import kernels
 from springcheck.engines.own import loops as own_loops
 from springcheck.engines.own import simulation as own
 from springcheck.physics import scenefile as scenes
@@ -178,7 +178,7 @@ def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(
                 monkeypatch.setattr(module, loop, watched)
 
     def by_index(terms: Any, *arguments: Any) -> None:
-        called.extend(key for key, rows in zip(layout.KINDS, terms, strict=True) if len(rows[0]))
+        called.extend(key for key, rows in zip(own_loops.KINDS, terms, strict=False) if len(rows[0]))
         indexed(terms, *arguments)
 
     indexed = own_loops.indexed
@@ -207,8 +207,7 @@ def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: 
 
 
 def test_what_was_left_out_is_said_in_one_line_for_each_reason() -> None:
-    from springcheck.studies.choose import choose
-    from springcheck.studies.text import left_out
+    from springcheck.studies.choose import choose, left_out
 
     _, left, _ = choose(scenes.load_scene("lc-circuit"), ())
     lines = [str(line) for line in left_out(left) if str(line)]

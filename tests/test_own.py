@@ -22,7 +22,7 @@ import pytest
 
 from springcheck import checks, driver, engines, schemes
 from springcheck.engines import Need, parse
-from springcheck.engines.own import ENGINE, compiled, kernels, loops, simulation, solver, tiles
+from springcheck.engines.own import ENGINE, compiled, kernels, laws, loops, simulation, solver, tiles
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
@@ -31,12 +31,16 @@ from springcheck.physics.terms import (
     Column,
     Cosine,
     Damping,
+    LennardJones,
     Morse,
     OnParticles,
     Quartic,
+    RadialMorse,
+    RadialSpring,
     Spring,
     Term,
     WallSpring,
+    Weight,
 )
 from springcheck.schemes.rounding import Met
 from springcheck.studies.choose import choose
@@ -289,6 +293,78 @@ def test_a_term_that_the_loops_do_not_have_is_carried_out_by_arrays(scheme: str)
     both = scene([1.7, 0.6], [0.3, 0.8], [0.2, -0.5], *(term for term in terms if term.key != "sextic"))
     none = scene([1.7, 0.6], [0.3, 0.8], [0.2, -0.5], terms[0], replace(terms[1], c=np.zeros(2)), terms[2])
     assert np.array_equal(run(both, scheme)[0], run(none, scheme)[0])
+
+
+def distances(steps: int) -> Scene:
+    """Two particles in a plane, each on a tie to a wall, and a Lennard-Jones bond and a sextic well."""
+    return Scene(
+        m=[1.7, 1.7, 0.6, 0.6], q=[0.1, 0.3, 1.2, 0.9], p=[0.2, -0.5, 0.1, 0.3], places=[0, 1, 3, 4],
+        step=0.01, steps=steps, name="test",
+        terms=(
+            RadialSpring.to_points(
+                i=[0, 1, 2], at=[0.4, -1, 2], k=[2, 2, 3.1], rest=[1, 1, 0.7], number=[0, 0, 1]
+            ),
+            LennardJones(a=[0, 1], b=[2, 3], depth=[0.7] * 2, diameter=[0.9] * 2, number=[0, 0]),
+            RadialMorse.to_points(
+                i=[2, 3], at=[0, 0], depth=[0.2] * 2, steepness=[0.8] * 2, rest=[1, 1], number=[0, 0]
+            ),
+            Sextic(i=[0, 3], c=[0.7, 0.2], at=[0.1, 0]),
+            Weight(i=[1], force=[-0.3], at=[0]),
+            Damping(i=[2], c=[0.1]),
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("scheme", ["explicit-euler", "velocity-verlet", "rk4"])
+def test_slopes_of_terms_that_the_loops_lack_are_compiled(scheme: str) -> None:
+    """As NumPy computes them, but for roundings of an exponential."""
+    pytest.importorskip("numba")
+    what, found = distances(300), []
+    for is_compiled in (False, True):
+        own = simulation.prepare(what, scheme, what.step, compiled=is_compiled)
+        assert (own.compiled, own.note) == (is_compiled, "")
+        q, p = np.empty((2, 100, what.n))
+        own.advance(3, q, p)
+        found.append((q, p))
+    for one, other in zip(*found, strict=True):
+        assert np.max(np.abs(one - other)) <= 300 * 2.0**-52
+
+
+def test_a_slope_is_compiled_where_a_run_is_long_or_its_note_says_why_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("numba")
+    for steps in (simulation.WORTH_A_LAW // 4 - 1, simulation.WORTH_A_LAW // 4):
+        own = simulation.prepare(distances(steps), "rk4", 0.01)
+        assert own.compiled is (4 * steps >= simulation.WORTH_A_LAW)
+        assert own.note == ""
+
+    @dataclass(frozen=True, kw_only=True, eq=False)
+    class Opaque(Sextic):
+        key: ClassVar[str] = "opaque"
+        slope: ClassVar[Any] = staticmethod(lambda u, c: {5: c}[5] * np.ldexp(u, 0) ** 5)
+
+    what = scene(1.7, 0.3, 0.2, wall(2.3), Opaque(i=[0], c=[0.7], at=[0.1]), steps=10**6)
+    own = simulation.prepare(what, "velocity-verlet", 0.1)
+    assert not own.compiled
+    assert "opaque is not compiled (numba" in own.note
+    assert "\n" not in own.note
+    run = driver.run(replace(what, steps=10**5, every=10**4), "own:rk4")
+    assert run.outcome.message == own.note
+    # a compiled slope is compared with NumPy's before it is used
+    right = laws._slope(LennardJones)[0]
+    monkeypatch.setattr(laws, "_slope", lambda kind: (lambda *given: (1 + 1e-13) * right(*given), ""))
+    own = simulation.prepare(replace(distances(10**6), terms=distances(1).terms[1:2]), "rk4", 0.01)
+    assert not own.compiled
+    assert "another function" in own.note
+
+
+def test_without_numba_a_slope_is_numpys(monkeypatch: pytest.MonkeyPatch) -> None:
+    laws._slope.cache_clear()
+    monkeypatch.setitem(sys.modules, "numba", None)
+    own = simulation.prepare(distances(10**6), "rk4", 0.01)
+    assert not own.compiled
+    assert "numba is not installed" in own.note
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

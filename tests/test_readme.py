@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -96,3 +99,18 @@ def test_what_a_document_names_is_there(document: Path) -> None:
 )
 def test_a_document_ends(document: str, most: int) -> None:
     assert len((ROOT / document).read_text(encoding="utf-8").split()) <= most
+
+
+def test_the_package_page_has_no_link_into_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a package index a relative link is dead: Hatch's hook makes addresses of them."""
+    plugin = ModuleType("hatchling.metadata.plugin.interface")
+    plugin.MetadataHookInterface = object  # type: ignore[attr-defined]
+    for name in ("hatchling", "hatchling.metadata", "hatchling.metadata.plugin", plugin.__name__):
+        monkeypatch.setitem(sys.modules, name, plugin)
+    hook = runpy.run_path(str(ROOT / ".github" / "readme.py"))["Readme"]()
+    hook.root = str(ROOT)
+    found: dict[str, Any] = {"urls": {"Source": "https://example.org/springcheck"}}
+    hook.update(found)
+    text = found["readme"]["text"]
+    assert "](https://example.org/springcheck/raw/HEAD/data/figures/phase-portrait.png)" in text
+    assert re.findall(r"\]\((?!https?:)[^)]+\)", text) == []

@@ -25,7 +25,7 @@ FOLDER = Path(__file__).parents[1] / "validation" / "upstream"
 NEEDS = {
     "ase": "ase", "cannon": "cannon-es", "dart": "dartpy", "jaxmd": "jax-md", "lammps": "mpich",
     "mujoco": "mujoco", "openmm": "openmm", "p2": "p2", "pybullet": "pybullet", "pymunk": "pymunk",
-    "rebound": "rebound",
+    "rebound": "rebound", "roadrunner": "libroadrunner",
 }  # fmt: skip
 
 STANDARD_ERRORS = 5
@@ -85,8 +85,9 @@ HERE = ("ase", "openmm")
 
 def printed(script: str) -> str:
     """What a script prints, run in this process; skips where OpenMM has no OpenCL."""
-    with redirect_stdout(StringIO()) as out, warnings.catch_warnings():
+    with redirect_stdout(StringIO()) as out, warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
         warnings.simplefilter("ignore")
+        patch.setattr(sys, "argv", [script])
         try:
             runpy.run_path(script, run_name="__main__")
         except Exception as error:
@@ -137,7 +138,7 @@ def test_every_finding_has_its_note_its_row_and_a_short_program() -> None:
             "Law",
             "Measured",
             "Where",
-            "What would mend it",
+            "Possible fix",
             "Does its tracker know",
         ):
             assert f"* **{part}**" in note, (script.stem, part)

@@ -98,7 +98,7 @@ def play(
         if scripted and not method.scripted:
             raise MethodError(NO_NORMAL_NUMBERS)
         seed = seed if scripted else checked_seed(seed)
-        draws = f"{THERMOSTATS[method.scheme].fresh} a step and particle"
+        draws = f"{THERMOSTATS[method.scheme].fresh} per step and particle"
         kept = GIVEN_DRAWS if scripted else str(seed)
         origin = {"seed": kept, "generator": method.generator, "threads": "1", "draws": draws}
     elif seed is not None:
@@ -117,7 +117,8 @@ def play(
     q, p = np.full((2, rows, scene.n), UNTOUCHED)
     _hand_over(scene, sink, 0, scene.q[None], scene.p[None])
     run_seconds = 0.0
-    outcome = Outcome(status="complete", step=scene.steps)
+    note = str(getattr(simulation.simulation, "note", ""))
+    outcome = Outcome(status="complete", step=scene.steps, message=note)
     frame, calls = 1, 0
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)

@@ -71,7 +71,7 @@ ENGINE = Engine(
     distribution="rapier3d",
     methods=named(
         by_name("force", "force-held-4", "RigidBody.add_force before each step of 4 substeps", EVERY_FORCE,
-            note="documented: a force is held over the substeps"),
+            note="documented: one force for all substeps"),
         by_name(
             "spring-joint", "implicit-euler-4",
             "SpringJoint without damping, its length far from 0, in 4 substeps", frozenset({"wall-spring"}),

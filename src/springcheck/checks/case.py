@@ -309,7 +309,7 @@ def overflows(how: Arithmetic) -> str:
 
 def keeps(how: Arithmetic) -> str:
     """Reason of steps that are off because an engine reused a force that it had computed before."""
-    return f"forces are kept while no position moves by more than {how.stale:g}"
+    return f"forces are reused while no position moves by more than {how.stale:g}"
 
 
 def least_moved(moved: Reals) -> Reals:

@@ -42,7 +42,7 @@ def found(case: Case) -> str:
     for later, held in clocks:
         taken = {later} if held else {c + later for c in right}
         if taken != right and _fits(case, later, held=held):
-            over = ", held over it," if held and len(right) > 1 else ""
+            over = ", used throughout," if held and len(right) > 1 else ""
             of = "" if max(taken) in (-1.0, 2.0) else " of the step"
             return (
                 f"the drive is taken at {_words(taken)}{of}{over} where {title} takes it at {_words(right)}"
@@ -141,7 +141,7 @@ def drive(case: Case) -> Finding | str:
     if not abs(later) <= bound:
         why = found(case)
         if not why:
-            return "steps are off, and not by the time of the drive or by another drive that is known here"
+            return "steps are wrong, and neither the time of the drive nor another known drive explains it"
     return Finding(abs(later), bound, "of a step", why)
 
 

@@ -55,7 +55,7 @@ def order(bench: Bench) -> Finding | str:
     return _order(bench, SPRING, "spring")
 
 
-@check("order, well", family="law", requires={"one-step"})
+@check("order, quartic", family="law", requires={"one-step"})
 def order_anharmonic(bench: Bench) -> Finding | str:
     """In a quartic potential, where order cannot lie, the error falls with the scheme's power of the step."""
     return _order(bench, WELL, "quartic potential")
@@ -170,23 +170,23 @@ WALK = frozenset({"one-step", "splitting", "symplectic", "double"})
 def rounding_bias(bench: Bench) -> Finding | str:
     """Rounding makes the shadow energy walk, not drift, beyond what the arithmetic implies."""
     if any(_is_short(bench, h) for h in (ODD, EVEN)):
-        return Finding(np.inf, 0.0, "a step", SHORT)
+        return Finding(np.inf, 0.0, "per step", SHORT)
     found = [_drift(bench, h) for h in (ODD, EVEN)]
     off = np.array([abs(mean - implied) for mean, _, implied in found])
     limit = np.array([SIGMAS * se + exact.EPS for _, se, _ in found])
     # the first that is no number, or else the worse
     worst = int(np.argmax(off / limit))
     if np.all(off <= limit) and np.max(limit) >= (most := schemes.roundings(bench.scheme) * 2.0**-52):
-        return f"its walk hides even {most:.1e} a step, the bias of every rounding together"
+        return f"its random walk hides even {most:.1e} per step, the bias of every rounding together"
     seen = "; ".join(
-        f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} a step, implied is {implied:.1e}"
+        f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} per step, implied is {implied:.1e}"
         for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)
     )
     if limit[worst] < off[worst] <= ROUNDED_MATRIX:
         seen += "; a one-step matrix whose elements are rounded drifts by as much"
     why = f"{SIGMAS:g} standard errors over {MEMBERS} springs and {LONG} steps; {seen}"
     # momenta times 1 + x at each step raise the energy by x of it: half of it is kinetic, and squared
-    return Finding(off[worst], limit[worst], "a step", why, Limits(area=float(np.min(limit))))
+    return Finding(off[worst], limit[worst], "per step", why, Limits(area=float(np.min(limit))))
 
 
 SHORT = "a run of it ended early"
@@ -219,7 +219,7 @@ def rounding_growth(bench: Bench) -> Finding | str:
     change = change - predicted_drift(run) * steps[:, None]
     slope, se = _growth(steps, change)
     if slope <= 0.5 + SIGMAS * se and 0.5 + SIGMAS * se >= 1:
-        return f"an exponent of {slope:.3f} +- {se:.3f} does not tell a walk from a bias"
+        return f"an exponent of {slope:.3f} +- {se:.3f} does not separate a random walk from a bias"
     seen = f"{slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, {LONG} steps of {ODD:g}"
     why = f"rounding errors that walk at random have 1/2, a bias 1; {seen}"
     return Finding(slope, 0.5 + SIGMAS * se, "exponent", why, Limits(area=_seen_bias(steps, change)))
@@ -273,9 +273,9 @@ def convergence(bench: Bench) -> Finding | str:
     slope, se, law = fit.slope, fit.standard_error, float(power)
     bound = student(len(error) - 2, CHANCE) * se
     if abs(slope - law) <= bound and bound >= law:
-        return f"an exponent of {slope:.3f} +- {se:.2g} does not tell its law from no law at all"
+        return f"an exponent of {slope:.3f} +- {se:.2g} is too uncertain to test the law"
     why = (
         f"exponent {slope:.3f} +- {se:.2g} over {len(error)} decades of tolerance; {bench.scheme.title} "
-        f"has {power}: what a step of its highest order leaves, times the number of steps"
+        f"has {power}: the error of one step of its highest order, times the number of steps"
     )
     return Finding(abs(slope - law), bound, "exponent", why, Limits(order=bound))

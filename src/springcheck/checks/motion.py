@@ -37,7 +37,7 @@ def closed_form(case: Case) -> Finding | str:
         return np.where(late[at], case.system.norm.size(*modes.out_of(*change)) / allowed[at], 0)
 
     why = (
-        f"roundings of {count(int(case.steps[worst]), 'step')}, carried on by the map: {_how(case)}"
+        f"roundings of {count(int(case.steps[worst]), 'step')}, accumulated by the map: {_how(case)}"
         + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion")
     )
     return Finding(distance[worst] / unit[worst], bound[worst], "roundings", why, sight.of_modes(case, part))
@@ -46,7 +46,7 @@ def closed_form(case: Case) -> Finding | str:
 def _how(case: Case) -> str:
     """How the roundings of many steps add up."""
     if np.all(np.isfinite(case.walk(case.steps))):
-        return "5 standard deviations of a walk, and those of the coefficients, at every step alike"
+        return "5 standard deviations of a random walk, and those of the coefficients, at every step alike"
     return "all of one sign"
 
 
@@ -161,8 +161,8 @@ def frequency(case: Case) -> Finding | str:
         return np.asarray(abs(x * dy - y * dx) / (x * x + y * y) / angle)
 
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
-    more = "" if abs(off) <= angle else "; whole turns are not counted, it may be off by more"
-    own = f"the scheme itself is off the true frequency by {true:.2e}"
+    more = "" if abs(off) <= angle else "; whole turns are not counted, the error may be larger"
+    own = f"the scheme's own frequency error is {true:.2e}"
     why = f"the closed form's bound as an angle; {own}{more}"
     return Finding(abs(off) / abs(expected), limit, "relative", why, sight.of_modes(case, part))
 

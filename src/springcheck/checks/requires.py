@@ -60,7 +60,7 @@ def _no_phase(case: Any) -> str | None:
     modes = case.system.modes
     lost = case.system.norm.most(modes.blur, 0 * modes.w2) > case.growth[1][-1]
     if lost or np.any((modes.w2 == 0) & (modes.pull != 0)):
-        return "a mode under a constant force has no closed form here"
+        return "a mode under a constant force has no analytic solution here"
     determinant = schemes.rotation(case.law.propagator).determinant
     if not np.all(np.isfinite(determinant)):
         return "the equation of an implicit step has no solution here"
@@ -80,12 +80,12 @@ def _no_answer(case: Any) -> str | None:
     if alone is case:
         return None
     if case.scheme.has("flow") or case.steps[0] != 0:
-        return "the closed form of what a drive adds is that of steps of forces, from the start of the run on"
+        return "the response to a drive is known for schemes that evaluate forces, from step 0"
     found = schemes.rotation(alone.law.propagator)
     if case.sums_steps:
-        return "the closed form of what a drive adds is that of times that are products, and these are sums"
+        return "the discrete response to a drive is known for times n h, and these times are running sums"
     if np.any(np.maximum(found.near, found.growth) * case.steps[-1] < CONTRACTED):
-        return "a driven mode that neither turns nor grows has no closed form here"
+        return "a driven mode that neither oscillates nor grows has no analytic solution here"
     return None
 
 
@@ -115,7 +115,7 @@ _ALL = (
         lambda x: x.scheme.convergence is not None, "no law is known for {title}")),
     Requirement("every-step", "every step recorded", _unless(
         lambda case: case.trajectory.every == 1 and len(case.trajectory.t) > 4,
-        "states further apart than a step, or fewer than five, leave no draw to be told")),
+        "states further apart than a step, or fewer than five, leave no draw that can be identified")),
     Requirement("two-frames", "two frames", _unless(
         lambda case: len(case.trajectory.t) > 1, "there is no second frame")),
     Requirement("solution", "a reference solution", _unsolved),
@@ -146,7 +146,7 @@ _ALL = (
         "slow and fast springs act at different times: no normal mode stays by itself")),
     Requirement("modes", "normal modes", _unless(
         lambda x: x.scene.system.has_modes,
-        "no closed form of the discrete motion: the scene is anharmonic or driven, or friction "
+        "no analytic solution of the scheme: the scene is anharmonic or driven, or friction "
         f"couples its modes, or more than {MOST_JOINED} particles are joined")),
     Requirement("few", f"{LARGEST} particles at most", _unless(
         lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),

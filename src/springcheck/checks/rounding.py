@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +26,9 @@ what is left beyond the rest length."""
 
 def of_step(
     case: Claim, q: Reals, p: Reals, places: list[Reals] | None, *,
-    smallest: np.longdouble = SMALLEST, recorded: bool = False,
-) -> tuple[Extended, Extended]:  # fmt: skip
-    """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
+    smallest: np.longdouble = SMALLEST, recorded: bool = False, width: Any = np.longdouble,
+) -> tuple[Reals, Reals]:  # fmt: skip
+    """One rounding of everything that one step from states (..., n) adds up, (..., n) each, in this width.
 
     `places` are the positions at which the scheme evaluates the force on its way: a nonlinear force is
     bounded there, and so is the solution of an implicit stage.  `smallest` is the loss of an operation to
@@ -36,8 +37,8 @@ def of_step(
     """
     run, scene = case.trajectory, case.judged
     how = run.arithmetic
-    q, p = q.astype(np.longdouble), p.astype(np.longdouble)
-    h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
+    q, p = q.astype(width), p.astype(width)
+    h, m, smallest = width(abs(run.step)), scene.m.astype(width), width(smallest)
     # the reference step rounds as well
     state = how.state + ROUNDOFF
     lost = of_underflow(case, smallest)
@@ -57,13 +58,13 @@ def of_step(
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
 
 
-def of_underflow(case: Claim, smallest: np.longdouble = SMALLEST) -> Extended:
+def of_underflow(case: Claim, smallest: Any = SMALLEST) -> Reals:
     """What underflow takes off the momenta in a stage (n,).
 
     A force, its product with the step, and a velocity may each lose `smallest`; a solver adds up n products.
     """
-    scene, h = case.judged, np.longdouble(abs(case.trajectory.step))
-    lost = smallest * (1 + scene.m.astype(np.longdouble) + h * scene.system.pulls())
+    scene, h = case.judged, type(smallest)(abs(case.trajectory.step))
+    lost = smallest * (1 + scene.m.astype(type(smallest)) + h * scene.system.pulls())
     return np.asarray(lost * scene.n if case.scheme.has("implicit") else lost)
 
 
@@ -97,9 +98,10 @@ def _evaluations(
 ) -> list[Met]:
     """Error bound `of` each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
-    far, none = np.full(scene.n, scene.system.far, np.longdouble), np.zeros(scene.n, np.longdouble)
-    pulls = scene.system.magnitude()(far, none) if case.trajectory.arithmetic.joints else 0.0
-    joints = OF_LENGTH / np.longdouble(case.roundings) * pulls
+    joints: Any = 0.0
+    if case.trajectory.arithmetic.joints:
+        far = np.full(scene.n, scene.system.far, np.longdouble)
+        joints = OF_LENGTH / np.longdouble(case.roundings) * scene.system.magnitude()(far, 0 * far)
     acting = {"slow": scene.system.slow, "fast": scene.system.fast}
     found: list[Met] = []
     brakes = scene.system.brakes_by_place
@@ -145,9 +147,9 @@ def _force(
 
     def force(q: Reals, p: Reals) -> Reals:
         sizes = plain(q + far, p)
-        bound = sizes * more
+        bound = sizes * more.astype(sizes.dtype)
         if width:
-            bound = bound + width * fine.pop(0)
+            bound = bound + sizes.dtype.type(width) * fine.pop(0)
         elif how is not case.trajectory.arithmetic:
             fine.append(sizes)
         if how.quantum:
@@ -155,6 +157,6 @@ def _force(
             # force below the quantum is lost, no more
             lost = np.minimum(how.quantum * count, sizes)
             bound = bound + whole * lost / (np.longdouble(how.state) * case.roundings)
-        return np.asarray(bound)
+        return np.asarray(bound, sizes.dtype)
 
     return force

@@ -190,8 +190,8 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
     if not np.any(off):
         return ""
     step, number = case.steps[int(np.argmax(off)) + 1], int(np.count_nonzero(off))
-    several = f"the first of {number} frames off is at step {step}{_regularly(case, off)}"
-    return f"; {several}" if number > 1 else f"; one frame is off, at step {step}"
+    several = f"the first of {number} wrong frames is at step {step}{_regularly(case, off)}"
+    return f"; {several}" if number > 1 else f"; one frame is wrong, at step {step}"
 
 
 def _regularly(case: Case, off: NDArray[np.bool_]) -> str:
@@ -243,7 +243,7 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
         if np.all(moved[off] <= 2 * how.stale):
             limit, does = keeps(how), f"moves by {moved[first]:.3g}"
     step = case.steps[first + 1]
-    return f"the engine's limit: {limit}, and step {step}, the first that is off, {does}" if limit else ""
+    return f"the engine's limit: {limit}, and step {step}, the first that is wrong, {does}" if limit else ""
 
 
 SHORTEST = float(np.sqrt(np.finfo(np.float64).smallest_normal))

@@ -25,8 +25,9 @@ Geometric Numerical Integration, VI.4.1), so it needs no code of its own beyond 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,9 @@ JOINED = 32
 
 SAMPLES = 16
 """Tangent vectors with a random sign of every rounding, which stand for the matrices of more particles."""
+
+SAFE = 1 + 2.0**-40
+"""Factor by which an allowance in doubles is made larger: its own few hundred roundings take less off it."""
 
 DEVIATIONS = 5.0
 """Standard deviations of roundings as good as random that are allowed: more once in 1.7 million; one more, as
@@ -181,33 +185,61 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     """The same where n x n numbers are too many: the sum of |D Phi^(s-1-i)| A(z_i), which has 2 n s terms, is
     at most the root of their number times that of the sum of their squares (Cauchy-Schwarz).  The latter is
     the standard deviation of the end where every rounding has a random sign; some such ends tell it.
+
+    The motion is extended, tangents and allowances are doubles, or extended where these leave their range.
     """
+    for width in (np.float64, np.longdouble):
+        with np.errstate(all="ignore"):
+            found, told = _in_width(case, q, p, steps, width)
+        if told:
+            break
+    return found
+
+
+def _in_width(case: Claim, q: Extended, p: Extended, steps: int, width: Any) -> tuple[Stretch, bool]:
+    """That in one width, and whether no number of it has left the range."""
     rng = np.random.default_rng(0)
     signs = np.array([-1.0, 1.0])
-    fixed, walk = rng.choice(signs, size=(3, 2, SAMPLES, 1, q.shape[1])), np.sqrt(_walk(case))
-    half = _recorded(case)
+    shape, walk, half = (2, SAMPLES, *q.shape), width(np.sqrt(_walk(case))), _recorded(case)
+    along = np.array([_to_one_side(case), 1 / np.sqrt(3), 1 / np.sqrt(3)])[:, None]
+    fixed = (rng.choice(signs, size=(2, q.shape[1], 3, SAMPLES)) * along).astype(width)
     # what decimals take off the first state is spread evenly within half a unit
-    begun = half[:, None, None] * rng.choice(signs, size=(2, SAMPLES, *q.shape)) if np.any(half) else 0.0
-    off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble) + begun * case.roundings / np.sqrt(3)
-    on = np.stack([q, p])
+    begun = half[:, None, None] * rng.choice(signs, size=shape) if np.any(half) else 0.0
+    off = np.zeros(shape, dtype=width) + begun * case.roundings / np.sqrt(3)
+    on, placed = np.stack([q, p]), case.placed
+    size = on.astype(width)
     reach, turns = np.abs(on), np.zeros(len(q), dtype=np.longdouble)
-    last = np.zeros_like(on)
-    with np.errstate(all="ignore"):
-        for _ in range(steps):
-            both = np.concatenate([on[:, None], off], axis=1)
-            off = np.stack(_varied(case, *both))[:, 1:]
-            before = on
-            on, last, _ = _one(case, *on)
-            alike = np.sum(fixed * _alike(case, before, on)[:, :, None], axis=0)
-            off = off + last[:, None] * (walk * rng.choice(signs, size=off.shape) + alike)
-            reach = np.maximum(reach, np.abs(on))
-            if case.law.has("implicit") and not case.system.is_linear:
-                turns = np.maximum(turns, _turn(case, on[0]))
-        spread = np.sqrt(np.mean(off * off, axis=1))
-        worst = np.maximum(last, spread * np.sqrt(2 * q.shape[1] * steps) / walk * WIDENED)
-        allowance = _allowed(case, worst, last, spread, T_SIXTEEN, random=not case.law.has("implicit"))
-        allowance = allowance + half[:, None]
-    return Stretch(end=on, allowance=allowance, last=last, reach=reach, turns=turns)
+    last = np.zeros_like(size)
+    recurs, turned = np.empty(shape, width), np.full((2, 2, *q.shape), 2, np.int8)
+    for _ in range(steps):
+        off = np.stack(_varied(case, *np.concatenate([size[:, None], off], axis=1)))[:, 1:]
+        places: list[Reals] | None = [] if placed else None
+        before, on = size, np.stack(case.step(*on, met=places))
+        if places is not None:
+            places = [np.asarray(x, width) for x in places]
+        last = SAFE * np.stack(rounding.of_step(case, *before, places, width=width))
+        size = on.astype(width)
+        way = np.stack([np.sign(before), np.sign(size - before)]).astype(np.int8)
+        # of few coordinates in a step the sign, or that of their change, is another than before
+        of, frame, particle = np.nonzero(np.any(way != turned, axis=0))
+        each, (one, two) = fixed[of, particle], way[:, of, frame, particle, None]
+        recurs[of, :, frame, particle] = each[:, 0] + one * each[:, 1] + two * each[:, 2] - walk
+        turned = way
+        bits = np.unpackbits(np.frombuffer(rng.bytes(-(-off.size // 8)), np.uint8), count=off.size)
+        noise = bits.reshape(shape) * (2 * walk)
+        noise += recurs
+        noise *= last[:, None]
+        off += noise
+        reach = np.maximum(reach, np.abs(on))
+        if case.law.has("implicit") and not case.system.is_linear:
+            turns = np.maximum(turns, _turn(case, on[0]))
+    spread = np.sqrt(np.mean(np.square(off), axis=1))
+    told = bool(np.isfinite([spread, last]).all())
+    spread, last = spread.astype(np.longdouble), last.astype(np.longdouble)
+    worst = np.maximum(last, spread * np.sqrt(2 * q.shape[1] * steps) / walk * WIDENED)
+    allowance = _allowed(case, worst, last, spread, T_SIXTEEN, random=not case.law.has("implicit"))
+    allowance = allowance + half[:, None]
+    return Stretch(end=on, allowance=allowance, last=last, reach=reach, turns=turns), told
 
 
 def _alike(case: Claim, before: Reals, after: Reals) -> Extended:
@@ -292,11 +324,37 @@ def tangent(case: Claim, q: Extended, p: Extended) -> Extended:
     return _joined(separate)([np.moveaxis(x[1:], 0, -1) for x in _varied(case, dq, dp)], axis=-2)
 
 
-def _varied(case: Claim, q: Extended, p: Extended) -> tuple[Extended, Extended]:
-    """One step of states (1 + d, ..., n): the first is a motion, the others are its perturbations."""
+def derivatives(
+    case: Claim, q: Reals, p: Reals, steps: int, scaled: Sequence[Mapping[Term, Term]]
+) -> tuple[Reals, Reals]:
+    """Derivatives of so many steps from states (f, n) by the step and by each of these numbers, whose part of
+    a term's force is another term's: (1 + d, f, n) each, in doubles.  Of scenes without friction and drives.
+
+    Steps of h (1 + x) of q and p are those of h of q and p (1 + x) where every force is (1 + x)**2 times as
+    large.
+    """
+    # the motion, and the derivatives below it
+    at = np.zeros((2, 2 + len(scaled), *q.shape))
+    at[:, 0] = q, p
+    at[1, 1] = p
+    with np.errstate(all="ignore"):
+        for _ in range(steps):
+            at = np.stack(_varied(case, *at, scaled))
+    at[1, 1] -= at[1, 0]
+    return at[0, 1:], at[1, 1:]
+
+
+def _varied(
+    case: Claim, q: Reals, p: Reals, parts: Sequence[Mapping[Term, Term]] | None = None
+) -> tuple[Reals, Reals]:
+    """One step of states (1 + d, ..., n): the first is a motion, the others are its perturbations.
+
+    With `parts` of terms they are its derivatives: the second state by the root of every force, the others by
+    the strength of a part, one for each.
+    """
     system = case.system
 
-    def slope(q: Reals) -> tuple[Extended, bool]:
+    def slope(q: Reals) -> tuple[Reals, bool]:
         # the changes solve the linear equations that belong to the motion
         k, joined = system.slope(q[0])
         return k[None], joined
@@ -311,8 +369,14 @@ def _varied(case: Claim, q: Extended, p: Extended) -> tuple[Extended, Extended]:
             change = brakes(np.broadcast_to(q[0], q[1:].shape), p[1:])
             for term in terms:
                 term.add_change(q[0], p[0] / system.m, q[1:], p[1:] / system.m, change)
-            return np.concatenate([whole(q[0], p[0])[None], change])
+                for part, row in zip(parts or (), change[1:], strict=False):
+                    if term in part:
+                        part[term].add_force(q[0], p[0], row)
+            now = whole(q[0], p[0])
+            if parts is not None:
+                change[0] += 2 * now
+            return np.concatenate([now[None], change])
 
         return force
 
-    return case.step(q, p, forces=forces, slope=slope, varied=True)
+    return case.law.step(q, p, forces=forces, slope=slope, varied=True)

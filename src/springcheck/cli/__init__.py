@@ -35,12 +35,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _mistake(error)
     command: Callable[[argparse.Namespace], int] = options.command
-    what = "nothing is kept"
+    what = "nothing was saved"
     if "keeps" not in options and "output" in options:
         # every file is moved into place as a whole, each of several figures too
         what = "no file is half written"
     elif "keeps" in options and options.keeps(options):
-        what = "what was finished is kept, the same command goes on"
+        what = "finished work is saved; the same command continues"
     interrupts.announce(f"interrupted; {what}")
     try:
         slips.look(options)

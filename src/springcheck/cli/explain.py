@@ -14,6 +14,7 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.bath import THERMOSTATS, Law
 from springcheck.checks.seeds import SEEDED
+from springcheck.engines.own.laws import why_not
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
 from springcheck.schemes import Scheme
@@ -40,7 +41,7 @@ WORDS = {
     "step defect": "the distance between a recorded step and the scheme's own step from the same state, "
     "evaluated in extended precision",
     "shadow energy": "a quantity close to the energy that a symplectic scheme conserves exactly on a spring",
-    "closed form": "the scheme's own motion after n steps, by a formula",
+    "closed form": "the scheme's own solution after n steps, as a formula",
     "detection limit": "the smallest relative error of a parameter that a check would have reported",
     "verdict": "one number, its bound, and the reason for the bound",
     "h omega": "the step times the highest angular frequency: the number on which stability depends",
@@ -139,6 +140,8 @@ def _term(term: Any) -> Iterator[str]:
         default = "" if column.default is None else f", {column.default:g} by default"
         sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
         yield f"  {column.name}: {sign}{default}"
+    why = why_not(term)
+    yield f"Long runs of own methods: {f'NumPy, not compiled ({why})' if why else 'compiled'}"
 
 
 def _method(name: str) -> Iterator[str]:
@@ -166,7 +169,7 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
         bounded = {0.0: "no step", math.inf: "every step"}.get(scheme.limit)
         area = "symplectic" if scheme.has("symplectic") else "not symplectic"
         if scheme.has("symplectic", "friction"):
-            area = "conformally symplectic: a step takes area by exp(-h c/m), without friction it keeps it"
+            area = "conformally symplectic: area falls by exp(-h c/m) per step; conserved without friction"
         where = bounded or f"h omega up to {scheme.limit:.6g}"
         braked = scheme.braked_order
         lower = f" ({braked} with friction)" if braked < scheme.order else ""

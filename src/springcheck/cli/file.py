@@ -18,7 +18,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Verdict
 from springcheck.studies import choose, keeper
-from springcheck.studies.text import left_out
+from springcheck.studies.choose import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 
@@ -145,12 +145,12 @@ def judge(
     judged, run, notes, taken = as_trajectory(path, states, found, known.name)
     if differences:
         run = replace(run, rebuilds_velocity=True)
-        notes += ("velocities are differences of positions, as was said, and judged so",)
+        notes += ("velocities were judged as differences of positions, as stated",)
     if arithmetic is not None:
         how = engines.arithmetic(engines.parse(arithmetic))
         state, written = max(how.state, run.arithmetic.state), run.arithmetic.written
         run = replace(run, arithmetic=replace(how, state=state, written=written))
-        notes += (f"judged by the arithmetic of {arithmetic}, as was said: {str(how) or 'double'}",)
+        notes += (f"judged with the arithmetic of {arithmetic}, as stated: {str(how) or 'double'}",)
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
         for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)

@@ -60,7 +60,9 @@ class Parser(argparse.ArgumentParser):
         print(message, end="", file=file, flush=True)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        found, extra = self.parse_known_args(args, namespace)
+        # names may begin with -, which leaves a column out
+        words = re.sub(r"(?<=\0--columns)\0(?=-,)", "=", "\0".join(["", *args])).split("\0")[1:]
+        found, extra = self.parse_known_args(words, namespace)
         if extra:
             (commands,) = (x for x in self._actions if isinstance(x, argparse._SubParsersAction))
             command = commands.choices[found.name]
@@ -88,7 +90,7 @@ def look(options: argparse.Namespace) -> None:
         if given.get(attribute) is not None:
             for option in unread:
                 if given.get("output" if option == "-o" else option[2:]):
-                    raise SpringcheckError(f"{option} is not read beside {called}: leave it out")
+                    raise SpringcheckError(f"{option} is not used with {called}: leave it out")
     if "rows" in given and given["rows"] is not None and given["trajectory"] is None:
         raise SpringcheckError("--rows is for the numbers of a trajectory: name one with --trajectory")
 

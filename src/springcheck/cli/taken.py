@@ -214,7 +214,7 @@ def _times(
         return states.t, every
     if np.any(states.t != t):
         notes.append(TIMES)
-        taken["times"] = f"{TIMES}; they are up to {np.max(off):.2g} beside them" if np.any(off) else TIMES
+        taken["times"] = f"{TIMES}; difference up to {np.max(off):.2g}" if np.any(off) else TIMES
     return t, every
 
 
@@ -297,6 +297,6 @@ def _along(
     if np.max(np.abs(here + there)) < np.max(np.abs(here - there)):
         line, positions, rest = -line, -positions, -rest
     where = ", ".join(f"{x:.4g}" for x in line)
-    notes.append(f"motion along ({where}), at most {beside:.1g} of its size beside it")
+    notes.append(f"motion along ({where}), off-axis motion at most {beside:.1g} of it")
     # across a line that is no axis the roundings of all frames add up
     return positions, rest, beside / (len(r) if np.max(np.abs(line)) < 1 - off else 1), line

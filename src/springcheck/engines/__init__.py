@@ -307,7 +307,7 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"
     of_bath = THERMOSTATS[what.scheme] if what.generator else None
     if of_bath and of_bath.rescales and of_bath.draws and not any(scene.p):
-        return "it multiplies all momenta by one factor, and those of the start are all 0"
+        return "it multiplies all momenta by one factor, and all initial momenta are 0"
     if of_bath and scene.bath and not scene.bath.friction * scene.step < of_bath.most:
         x = scene.bath.friction * scene.step
         return f"from friction * step = {of_bath.most:g} on it is no thermostat, and here that is {x:.6g}"

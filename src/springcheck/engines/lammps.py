@@ -292,7 +292,7 @@ ENGINE = Engine(
         by_name("external", "velocity-verlet", "fix external, set by callback, fix nve",
                 EVERY_POTENTIAL | DRIVEN),
         by_name(
-            "respa", "respa8", "run_style respa: bonds 8 times a step, fix spring/self and restrain once",
+            "respa", "respa8", "run_style respa: bonds 8 times per step, fix spring/self and restrain once",
             SPRINGS, Need.FAST_SPRINGS,
         ),
     ),

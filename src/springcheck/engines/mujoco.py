@@ -184,8 +184,8 @@ ENGINE = Engine(
         by_name("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
         by_name("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),
         by_name(
-            "motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", EVERY_FORCE,
-            note="documented: a control is held for the whole call; mujoco#1891"),
+            "motor-frame-skip-5", "force-held-5", "force by a motor, one for 5 substeps of h/5", EVERY_FORCE,
+            note="documented: a control is constant for the whole call; mujoco#1891"),
     ),
     start=_Steps,
     version=version_of("mujoco"),

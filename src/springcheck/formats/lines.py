@@ -44,6 +44,12 @@ class Lines:
             raise self.wrong(f"{self.number:,} lines with {self._numbers:,} numbers: leave out the rest")
         return line.rstrip("\r\n")
 
+    def take(self) -> str:
+        """The next line of a frame.  StoreError at the end of the file."""
+        for line in self:
+            return line
+        raise self.wrong("is damaged or cut off")
+
     def wrong(self, what: str) -> StoreError:
         """An error that names file and line."""
         return StoreError(f"{self.path}, line {self.number}: {what}")

@@ -108,7 +108,7 @@ def _said(
     else:
         statement = f"{HEAD}, {' or '.join(kept)}{'' if sure else ' or one that is not known here'}"
     if all(x.friction <= SURE * x.friction_error for x in rows[kept[0]]):
-        statement += "; no friction shows: random kicks without one would do as well in so few frames"
+        statement += "; no friction shows: random kicks without friction fit so few frames equally"
     if against:
         statement = f"{statement}, but of {', '.join(against)}"
     remedy = "look at the units of what is stated, and at what the engine was given"

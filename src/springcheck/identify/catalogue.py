@@ -174,7 +174,7 @@ def _unequal(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
 
 
 HELD = Row(
-    scheme="held-force", title="Semi-implicit Euler whose force is held over substeps", formula=_held,
+    scheme="held-force", title="Semi-implicit Euler with one force for several substeps", formula=_held,
     free="share", start=(0.5, 0.75, 0.3),
 )  # fmt: skip
 """A force that is held over n substeps: g = (n + 1)/2n where each kicks first, (n - 1)/2n where it drifts."""
@@ -217,7 +217,7 @@ TABLEAUX: tuple[tuple[str, Any, Any], ...] = (
 )  # fmt: skip
 """Mistakes in Runge-Kutta methods: what is wrong, stages and weights."""
 
-OLD_FORCE = "Velocity Verlet whose second half kick uses the old force, so that one force is held over the "
+OLD_FORCE = "Velocity Verlet whose second half kick uses the old force, so that one force is used for the "
 OLD_FORCE += "whole step, or a Runge-Kutta method whose later stages do"
 STEPS: tuple[tuple[str, str, str, Any], ...] = (
     ("old-force", OLD_FORCE, "compute the force anew after the drift, or in each stage",

@@ -42,7 +42,7 @@ _KNOWN = (
         name="velocity-offset",
         title="the time of the velocities after that of the positions, in steps",
         formula="-1/2 or +1/2 where the map is symmetric once velocities are moved by half a step, else 0",
-        sees="leapfrog, whose velocities stand half a step beside its positions",
+        sees="leapfrog, whose velocities belong to times half a step from those of its positions",
         misses="whether an engine means leapfrog or semi-implicit Euler: both have the very same states",
         source="Hockney & Eastwood, Computer Simulation Using Particles (1988), 4.4",
     ),
@@ -69,10 +69,10 @@ _KNOWN = (
     ),
     Meaning(
         name="held-force",
-        title="one force held over several substeps",
+        title="one force used for several substeps",
         formula="q' = q + h v + s (h**2 F/m), v' = v + h F/m with one F; s tells the number of substeps",
         sees="frame skip: a control loop that sets the force once for several steps of the engine",
-        misses="a force held over a whole step of a scheme that calls it once anyway",
+        misses="a force used for a whole step of a scheme that calls it once anyway",
     ),
 )
 

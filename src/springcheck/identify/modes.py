@@ -61,8 +61,8 @@ def oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str]
     moving = [j for j in moving if j not in pulled]
     if not moving:
         raise IdentificationError(
-            f"no force acts on oscillator {pulled[0]} but a constant one, by which few schemes can be told "
-            "apart: state the scene, or record a motion on a spring"
+            f"only a constant force acts on oscillator {pulled[0]}; few schemes differ there: "
+            "state the scene, or record a motion on a spring"
         )
     maps = [measure(record, j) for j in moving]
     if len(moving) > 1 and any(not x.spans or x.excess > 40 for x in maps):

@@ -287,7 +287,7 @@ def _held(x: Joint) -> str:
     if off < max(error, 1 / 64):
         return ""
     order = "kick, then drift" if share > 0.5 else "drift, then kick"
-    return f"Semi-implicit Euler whose force is held over {round(1 / off)} substeps ({order})"
+    return f"Semi-implicit Euler with one force for {round(1 / off)} substeps ({order})"
 
 
 def _shared(candidates: tuple[Candidate, ...]) -> dict[str, Any]:

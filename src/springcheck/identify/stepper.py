@@ -147,9 +147,9 @@ def identify_stepper(step: Stepper, *, single: bool = False) -> Identification:
         # more stages than the scheme needs: a fault of the same map has them
         wrong += [Explanation(one.fault, one.remedy) for one in FAULTS if same(one, of_scheme(found.scheme))]
     slope, deviation = _order(step)
-    order = f"order {slope:.2f} +- {deviation:.2f} on a quartic well"
+    order = f"order {slope:.2f} +- {deviation:.2f} in a quartic potential"
     if math.isnan(slope):
-        order = "its error on a quartic well does not fall as a power of the step: no order is seen"
+        order = "its error in a quartic potential does not fall as a power of the step: no order is measured"
     known = SCHEMES.get(str(found.scheme)) or ELSEWHERE.get(str(found.scheme))
     if not wrong and known and known.order and slope < known.order - max(5 * deviation, 0.25):
         cause = (

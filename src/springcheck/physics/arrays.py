@@ -90,14 +90,14 @@ class Arithmetic:
     """Precision in which force constants and rest lengths are stored."""
     excess: float = told("every force {:.2g} too large", 0.0)
     """Relative excess of every force."""
-    stale: float = told("forces kept within {:.2g}", 0.0)
+    stale: float = told("forces reused within {:.2g}", 0.0)
     """Largest displacement since a force was computed for which the engine reuses it [L]."""
     cancels: int = told("coefficients of the bath from 1 - exp(-friction h) as a difference", 0)
     """Power of 1/x, x = gamma h, or of x above 1, in the relative rounding of a thermostat's coefficients,
     from 1 - c with a rounded c."""
     keeps_displacement: bool = False
     """Whether a velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
-    from_start: bool = told("positions kept as displacements from the start", False)
+    from_start: bool = told("positions stored as displacements from the start", False)
     """Whether positions are stored as displacements from the start, as total Lagrangian elements do."""
     joints: bool = told("springs as joints whose lengths are rounded", False)
     """Whether springs are joints of length `System.far`, whose rounding each force has."""

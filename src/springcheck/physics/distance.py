@@ -266,19 +266,19 @@ class LennardJones(OnDistances):
     diameter: Floats
 
     @staticmethod
-    def potential(u: Reals, depth: Floats, diameter: Floats) -> Reals:
+    def potential(u: Reals, depth: Floats, diameter: Floats) -> Any:
         x = (diameter / u) ** 2
-        return np.asarray(4 * depth * (x * x * x) * (x * x * x - 1))
+        return 4 * depth * (x * x * x) * (x * x * x - 1)
 
     @staticmethod
-    def slope(u: Reals, depth: Floats, diameter: Floats) -> Reals:
+    def slope(u: Reals, depth: Floats, diameter: Floats) -> Any:
         x = (diameter / u) ** 2
-        return np.asarray(-24 * depth / u * (x * x * x) * (2 * (x * x * x) - 1))
+        return -24 * depth / u * (x * x * x) * (2 * (x * x * x) - 1)
 
     @staticmethod
-    def second(u: Reals, depth: Floats, diameter: Floats) -> Reals:
+    def second(u: Reals, depth: Floats, diameter: Floats) -> Any:
         x = (diameter / u) ** 2
-        return np.asarray(24 * depth / (u * u) * (x * x * x) * (26 * (x * x * x) - 7))
+        return 24 * depth / (u * u) * (x * x * x) * (26 * (x * x * x) - 7)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -300,16 +300,16 @@ class RadialMorse(OnDistances):
     rest: Floats
 
     @staticmethod
-    def potential(u: Reals, depth: Floats, steepness: Floats, rest: Floats) -> Reals:
+    def potential(u: Reals, depth: Floats, steepness: Floats, rest: Floats) -> Any:
         gap = -np.expm1(-steepness * (u - rest))
-        return np.asarray(depth * gap * gap)
+        return depth * gap * gap
 
     @staticmethod
-    def slope(u: Reals, depth: Floats, steepness: Floats, rest: Floats) -> Reals:
+    def slope(u: Reals, depth: Floats, steepness: Floats, rest: Floats) -> Any:
         gap = -np.expm1(-steepness * (u - rest))
-        return np.asarray((2 * depth * steepness) * (1 - gap) * gap)
+        return (2 * depth * steepness) * (1 - gap) * gap
 
     @staticmethod
-    def second(u: Reals, depth: Floats, steepness: Floats, rest: Floats) -> Reals:
+    def second(u: Reals, depth: Floats, steepness: Floats, rest: Floats) -> Any:
         x = 1 + np.expm1(-steepness * (u - rest))
-        return np.asarray(2 * depth * steepness**2 * x * (2 * x - 1))
+        return 2 * depth * steepness**2 * x * (2 * x - 1)

@@ -107,7 +107,7 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
     yield "terms", terms
     steps, every = _whole(scene.steps, "steps"), _whole(scene.every, "every")
     if steps > MOST_STEPS:
-        raise SceneError(f"steps = {steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h")
+        raise SceneError(f"steps = {steps}: at most 2**53 = {MOST_STEPS} are distinct in t = i h")
     if steps % every:
         raise SceneError(
             f"every = {every}: steps = {steps} is no multiple of it, so the end would not be recorded"

@@ -253,15 +253,15 @@ _ATTACHED = (
     *(
         splitting(
             f"force-held-{n}", f"semi-implicit Euler, {n} substeps by one force", 1, 0.0, _force_held(n),
-            "a control force held for a frame of n substeps (frame_skip): [[1 - g a, h/m], [-h k, 1]] "
+            "a control force constant for a frame of n substeps (frame_skip): [[1 - g a, h/m], [-h k, 1]] "
             "with g = (n + 1)/2n and a = (h w)**2, determinant 1 + a (n - 1)/2n", symplectic=False,
         )
         for n in (2, 4, 5, 10)
     ),
     splitting(
-        "force-held-rk4", "constant force over the step (RK4 of a force that is held)", 1, 0.0,
+        "force-held-rk4", "constant force over the step (RK4 of that force)", 1, 0.0,
         (("kick", HALF), ("drift", ONE), ("held", HALF)),
-        "a force held over infinitely many substeps; velocity Verlet that kicks twice by the old "
+        "one force for infinitely many substeps; velocity Verlet that kicks twice by the old "
         "force; determinant 1 + (h w)**2/2", symplectic=False,
     ),
     splitting(

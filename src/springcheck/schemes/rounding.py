@@ -12,7 +12,7 @@ import numpy as np
 from springcheck.physics.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Setting
-from springcheck.schemes.stepping import sparse_solver, weighted_sum
+from springcheck.schemes.stepping import OfLast, sparse_solver, weighted_sum
 
 Applied: TypeAlias = Callable[[Reals], Reals]
 """x (..., n) -> a matrix times x (..., n)."""
@@ -62,8 +62,9 @@ def magnitude_step(
     the positions and momenta of each stage (n,), which the stages after it carry on.
     """
     start = q, p
-    # in extended precision: the square of a step may leave the range of a double
-    q, p, wide = np.abs(q), np.abs(p), np.longdouble(h)
+    # of doubles too few digits do no harm, but the square of a step may leave their range
+    q, p, wide = np.abs(q), np.abs(p), q.dtype.type(h)
+    rate = None if rate is None else rate.astype(q.dtype)
     each = iter(met)
     if scheme.stages:
         last = np.zeros_like(p)
@@ -180,12 +181,21 @@ def _separate(stiffness: Reals, factor: Reals) -> tuple[Applied, Applied]:
 
 def _joined(stiffness: Reals, factor: Reals) -> tuple[Applied, Applied]:
     """The same for matrices K (..., n, n)."""
+    return (
+        _of_one(stiffness, factor) if stiffness.ndim == np.ndim(factor) + 1 == 2 else _each(stiffness, factor)
+    )
+
+
+def _each(stiffness: Reals, factor: Reals) -> tuple[Applied, Applied]:
     wide = np.asarray(factor, np.float64)[..., :, None] * np.asarray(stiffness, np.float64)
     try:
         found = np.linalg.inv(np.eye(wide.shape[-1]) + wide)
     except np.linalg.LinAlgError:
         found = np.full(wide.shape, np.inf)
     return partial(_product, np.abs(found)), partial(_product, np.abs(wide @ found))
+
+
+_of_one = OfLast(_each)
 
 
 def _sparse(stiffness: Any, factor: Reals) -> tuple[Applied, Applied]:

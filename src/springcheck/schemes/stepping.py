@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -121,10 +120,40 @@ def sparse_solver(stiffness: Any, factor: Reals) -> Callable[[Reals], Reals]:
     return solve
 
 
-@lru_cache(maxsize=2)
-def _inverse(matrix: bytes, n: int) -> Floats:
-    """The inverse of a matrix (n, n), found once for all steps of a run."""
-    return np.asarray(np.linalg.inv(np.frombuffer(matrix).reshape(n, n)))
+Made = TypeVar("Made")
+
+
+class OfLast(Generic[Made]):
+    """What is made of a stiffness (n, n) and a factor (n,), kept for the two that were asked for last: of a
+    linear scene all steps have the same."""
+
+    def __init__(self, make: Callable[[Any, Floats], Made]) -> None:
+        self._make = make
+        self._last: list[tuple[Any, Floats, Made]] = []
+
+    def __call__(self, stiffness: Any, factor: Reals) -> Made:
+        of = np.array(np.broadcast_to(factor, stiffness.shape[-1:]), np.float64)
+        for known, its, made in self._last:
+            if known is stiffness and np.array_equal(its, of):
+                return made
+        found = self._make(stiffness, of)
+        self._last = [(stiffness, of, found), *self._last[:1]]
+        return found
+
+
+@OfLast
+def _inverse(stiffness: Reals, factor: Floats) -> Callable[[Reals], Reals]:
+    """x (..., n) -> (1 + factor K)**-1 x in double precision."""
+    if len(factor) > MOST_INVERTED:
+        from scipy.sparse import csr_array
+
+        return sparse_solver(csr_array(np.asarray(stiffness, np.float64)), factor)
+    inverse = np.linalg.inv(np.eye(len(factor)) + np.asarray(stiffness * factor[:, None], np.float64))
+    return lambda x: np.asarray(x.astype(np.float64) @ inverse.T)
+
+
+MOST_INVERTED = 256
+"""Joined particles up to which a step multiplies by the inverse of a matrix; of more it is sparse mostly."""
 
 
 def _implicit_stage(
@@ -229,12 +258,12 @@ def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> R
     if not isinstance(stiffness, np.ndarray):
         solve = sparse_solver(stiffness, factor)
         return np.asarray(solve(residual) * size)
-    matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[..., None], np.float64)
-    right = residual.astype(np.float64)
     try:
-        if matrix.ndim == 2:
-            found = right @ _inverse(np.ascontiguousarray(matrix).tobytes(), len(matrix)).T
-            return np.asarray(found * size)
+        if stiffness.ndim == np.ndim(factor) + 1 == 2:
+            return np.asarray(_inverse(stiffness, factor)(residual) * size)
+        matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[..., None], np.float64)
+        right = residual.astype(np.float64)
         return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0] * size)
-    except np.linalg.LinAlgError:
+    except (np.linalg.LinAlgError, RuntimeError):
+        # singular, as dense and as sparse solvers say it
         return np.full_like(residual, np.nan)

@@ -45,8 +45,26 @@ def check(path: str | Path, *, most: int | None = None) -> list[Damage]:
     return found
 
 
+def is_store(path: Path) -> bool:
+    """Whether an HDF5 file is a store of ours, not one of another program."""
+    if not _is_marked(path):
+        return False
+    apart.trust(path, parts.TRIAL)
+    with access.for_reading(path) as file:
+        return access.attribute(file, "format") in (layout.FORMAT, *layout.OLDER)
+
+
+def _is_marked(path: Path) -> bool:
+    """Whether a file may be a store: the mark of its format is among its first bytes."""
+    with files.told(path, "read"), path.open("rb") as file:
+        return b"springcheck store " in file.read(1 << 20)
+
+
 def doubts(path: str | Path) -> list[Damage]:
     """Damage of a store whose numbers are about to be shown; none for a file of another program."""
+    path = Path(path)
+    if path.is_file() and not _is_marked(path):
+        return []
     found = check(path, most=LONGEST_CHECK)
     return [] if any(NO_STORE in finding.what for finding in found) else found
 

@@ -120,7 +120,7 @@ class Cluster:
             }
             for future in distributed.as_completed(list(keys), loop=client.loop):
                 if future.status in ("cancelled", "lost"):
-                    said = "the scheduler is gone; what was finished is kept, the same command goes on"
+                    said = "the scheduler is gone; finished work is saved; the same command continues"
                     raise SpringcheckError(f"--cluster {self.place}: {said}")
                 yield keys[future], future.result()
 

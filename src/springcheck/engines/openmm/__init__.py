@@ -57,7 +57,7 @@ ENGINE = Engine(
             "LangevinMiddleIntegrator at T = 0, started and read synchronised", _DRIVEN | {"damping"},
             Need.DAMPING, one_friction=True,
         ),
-        by_default("mts", "respa8", "MTSIntegrator, fast springs 8 times a step", _TERMS, Need.FAST_SPRINGS),
+        by_default("mts", "respa8", "MTSIntegrator, 8 steps of fast springs", _TERMS, Need.FAST_SPRINGS),
         by_name(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
@@ -81,7 +81,7 @@ ENGINE = Engine(
             note="on GPU platforms it collides at most 2/pi as often as asked",
         ),
         _drawn(
-            "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step",
+            "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once per step",
             default=False, rebuilds_velocity=False,
         ),
     ),

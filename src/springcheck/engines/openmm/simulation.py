@@ -271,7 +271,7 @@ class _Context:
             # the half kicks below must be those of the springs as OpenMM rounds them
             scene = scene.system.in_single
         if scene.system.is_driven and arithmetic(label).state > 2.0**-53:
-            raise MethodError(f"{label}: the time of a drive is a parameter, kept in single precision there")
+            raise MethodError(f"{label}: the time of a drive is a parameter, in single precision there")
         self.force_calls, self.off_axis = 0, 0.0
         self._done, self._step, self._driven = 0, step, scene.system.is_driven
         origins = bonds.rests(scene, label) if method.generator else bonds.origins(scene, method.scheme)

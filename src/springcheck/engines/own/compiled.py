@@ -28,7 +28,7 @@ than a step of a few hundred particles."""
 HELPERS: tuple[Callable[..., Any], ...] = tuple(
     thing
     for thing in vars(loops).values()
-    if inspect.isfunction(thing) and thing.__module__ == loops.__name__
+    if inspect.isfunction(thing) and thing.__module__ == loops.__name__ and thing is not loops.others
 )
 """The functions that the kernels call."""
 
@@ -36,8 +36,11 @@ HELPERS: tuple[Callable[..., Any], ...] = tuple(
 @cache
 def _registered() -> None:
     """Register the helpers with numba, which calls no other function."""
-    from numba.extending import register_jitable
+    from numba.extending import overload, register_jitable
 
+    overload(loops.others, jit_options=HELP, strict=False)(
+        lambda laws, q, f: loops.others if len(laws) else loops.none
+    )
     for helper in HELPERS:
         register_jitable(**HELP)(helper)
 

@@ -8,12 +8,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.engines.own.loops import Slot
+from springcheck.engines.own import laws
+from springcheck.engines.own.loops import KINDS, Slot
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring, known
 
-KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping", "drive")
-"""The terms that the kernels have, in the order in which `loops.indexed` takes them."""
+FRICTIONS = ("damping", "van-der-pol")
 
 NO_INDEX: Integers = np.empty(0, np.int64)
 NOTHING: Floats = np.empty(0)
@@ -36,20 +36,21 @@ def slots(parts: Sequence[Sequence[Term]], m: Floats) -> list[Slot]:
     return [(False, nothing, *row) for row in rows if row is not None]
 
 
-def lists(terms: Iterable[Term], m: Floats) -> tuple[tuple[NDArray[Any], ...], ...]:
-    """Ends and parameters of each kind of term, each (s,); s is 0 where there is none.
+def lists(terms: Iterable[Term], m: Floats) -> tuple[tuple[Any, ...], ...]:
+    """Ends and parameters of each kind of term, each (s,); s is 0 where there is none.  The last are `laws`.
 
     In the order of the term's columns; friction also takes the masses.
     """
     parts = tuple(terms)
-    return tuple(_columns([term for term in parts if term.key == key], key, m) for key in KINDS)
+    known = [_columns([term for term in parts if term.key == key], key, m) for key in KINDS]
+    return *known, tuple(laws.compiled(term) for term in parts if term.key not in KINDS)
 
 
 def _columns(found: list[Term], key: str, m: Floats) -> tuple[NDArray[Any], ...]:
     kind = known()[key]
     ends = [_joined(NO_INDEX, found, name) for name in kind.ends]
     parameters = [_joined(NOTHING, found, column.field) for column in kind.columns]
-    return (*ends, *parameters, m[ends[0]]) if key == "damping" else (*ends, *parameters)
+    return (*ends, *parameters, m[ends[0]]) if key in FRICTIONS else (*ends, *parameters)
 
 
 def _joined(none: NDArray[Any], found: list[Term], name: str) -> NDArray[Any]:
@@ -61,7 +62,7 @@ def _row(terms: Sequence[Term], m: Floats) -> Row | None:
     n = len(m)
     if not all(isinstance(term, WallSpring | Spring | Damping) for term in terms):
         return None
-    (i, k, at), (a, b, stiffness, rest), _, _, _, (slow, c, _), *_ = lists(terms, m)
+    (i, k, at), (a, b, stiffness, rest), _, _, _, _, (slow, c, _), *_ = lists(terms, m)
     if len(np.unique(slow)) < len(slow) or len(np.unique(i)) < len(i):
         return None
     chain = _chain(a, b, stiffness, rest, n)

@@ -3,7 +3,8 @@
 See `kernels` for the rules that every loop here keeps.  A row is what needs no index: one wall spring on
 every particle, or walls at its ends alone; springs between neighbours, or none; friction.
 
-To add a term: write its loop in `indexed`, and name it in `layout.KINDS`.
+To add a term: write its loop in `indexed`, and name it in `KINDS`.  Others are compiled from their
+classes (`laws`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,11 @@ friction."""
 
 Solver: TypeAlias = Any
 """The factors of an implicit step: see `solve`."""
+
+KINDS = (
+    "wall-spring", "spring", "quartic", "cosine", "weight", "morse", "damping", "van-der-pol", "drive",
+)  # fmt: skip
+"""The terms that the loops have, in the order in which `indexed` takes them."""
 
 INFINITE = math.inf
 LARGEST_EXPONENT = 709.782712893384
@@ -47,7 +53,7 @@ def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     What is driven reads the time off the last coordinate, and is summed as NumPy sums: first over all ends a,
     then over all ends b.
     """
-    walls, springs, quartics, cosines, morses, dampings, drives = terms
+    walls, springs, quartics, cosines, weights, morses, dampings, brakes, drives, laws = terms
     driven = len(drives[0]) > 0
     for j in range(len(f)):
         f[j] = 0.0
@@ -70,18 +76,36 @@ def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     i, depth, wave, at = cosines
     for s in range(len(i)):
         f[i[s]] += -(depth[s] * wave[s]) * sine(wave[s] * (q[i[s]] - at[s]))
+    i, force, _ = weights
+    for s in range(len(i)):
+        f[i[s]] += force[s]
     a, b, depth, steepness, rest = morses
     for s in range(len(a)):
         x = exponential(-steepness[s] * (q[b[s]] - q[a[s]] - rest[s]))
         tension = 2.0 * depth[s] * steepness[s] * x * (1.0 - x)
         f[a[s]] += tension
         f[b[s]] -= tension
+    others(laws, q, f)
     i, c, m = dampings
     for s in range(len(i)):
         f[i[s]] += -c[s] * (p[i[s]] / m[s])
+    i, c, width, at, m = brakes
+    for s in range(len(i)):
+        x = (q[i[s]] - at[s]) / width[s]
+        f[i[s]] -= c[s] * ((x - 1.0) * (x + 1.0)) * (p[i[s]] / m[s])
     i, amplitude, frequency, phase = drives
     for s in range(len(i)):
         f[i[s]] += amplitude[s] * cosine(frequency[s] * q[len(q) - 1] + phase[s])
+
+
+def others(laws: Any, q: Numbers, f: Numbers) -> None:
+    """Add the forces of the terms of `laws` to f; compiled without any it is `none`."""
+    for ends, firsts, x, pull in laws:
+        pull(ends, firsts, x, q, f)
+
+
+def none(laws: Any, q: Numbers, f: Numbers) -> None:
+    """Nothing: a loop over no pointer has no type."""
 
 
 def held(k: Numbers, at: Numbers, q: Numbers, f: Numbers) -> None:

@@ -2,8 +2,10 @@
 
 numba is imported only for a run that is worth it (see `WORTH`).  The numbers are the same either way,
 to the last bit, so a machine without numba, or with a cache folder that cannot be written, gets them too.
-They do not depend on how the particles are cut into tiles, nor on the number of threads.  A scene with a
-term that the loops do not have is carried through the same steps by NumPy, at any length.
+They do not depend on how the particles are cut into tiles, nor on the number of threads.
+
+A scene with a term that the loops do not have is carried through the same steps by NumPy.  In a long run the
+loops do it, with the term's own slope compiled (`laws`); an exponential may then differ by a rounding.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 import springcheck
 from springcheck import schemes
 from springcheck.engines.contract import Label, Method
-from springcheck.engines.own import kernels, layout, solver, tiles, vectors
+from springcheck.engines.own import kernels, laws, layout, loops, solver, tiles, vectors
 from springcheck.engines.own.operations import NoKernelError, Program, evaluations, program, terms_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -29,13 +31,25 @@ WORTH = 1_000_000
 takes 0.15 s, loading cached code 5 ms, compiling it the first time 1 to 4 s."""
 
 
+WORTH_A_LAW = 100_000
+"""Calls of the force from which on compiling a term's slope pays: NumPy takes 10 us each, compiling 1 s."""
+
+
 class Own:
-    """A started run of an own method: `how` fills rows, `compiled` says whether by a compiled kernel."""
+    """A started run of an own method: `how` fills rows, `compiled` says whether by a compiled kernel.
+
+    `note` says of a long run why it is not compiled.
+    """
 
     def __init__(
-        self, how: tiles.Whole | tiles.Tiled | vectors.Vectors, calls: tuple[int, int], *, compiled: bool
+        self,
+        how: tiles.Whole | tiles.Tiled | vectors.Vectors,
+        calls: tuple[int, int],
+        *,
+        compiled: bool,
+        note: str = "",
     ) -> None:
-        self.compiled = compiled
+        self.compiled, self.note = compiled, note
         self._first, self._each = calls
         self._steps = 0
         self._how = how
@@ -80,8 +94,8 @@ def prepare(
 ) -> Own:
     """Like `start`, by any scheme; `compiled` forces the kernel either way, by default the length decides.
 
-    Forced, a missing numba is an ImportError; otherwise the interpreted kernel serves.  At most `threads`
-    threads are used, by default as many as there are processors.
+    Forced, a missing numba is an ImportError; otherwise the interpreted kernel serves, or NumPy.  At most
+    `threads` threads are used, by default as many as there are processors.
     """
     found = schemes.scheme(scheme) if isinstance(scheme, str) else scheme
     calls = evaluations(found, scene)
@@ -90,8 +104,16 @@ def prepare(
             plan = program(found, scene, float(step))
         except NoKernelError:
             plan = None
-        if plan is None or _lacks(plan, scene):
-            return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
+        apart = plan is None or _lacks(plan, scene)
+        others = [] if apart else [term for term in scene.terms if term.key not in loops.KINDS]
+        note = ""
+        if others:
+            long = max(calls) * scene.steps >= WORTH_A_LAW if compiled is None else compiled
+            whys = {term.key: laws.obstacle(term, scene.q) for term in others if long}
+            note = "; ".join(f"{key} is not compiled ({why})" for key, why in whys.items() if why)
+            compiled, apart = True, bool(note) or not long
+        if plan is None or apart:
+            return Own(vectors.Vectors(found, scene, step), calls, compiled=False, note=note)
         scene = scene.system.clocked
         job = _one(plan, scene) or _many(plan, scene, max(calls))
     ahead = job.work * scene.steps >= WORTH if compiled is None else compiled
@@ -108,11 +130,13 @@ def prepare(
 
 
 def _lacks(plan: Program, scene: Scene) -> bool:
-    """Whether the loops lack a term, or beside one that depends on the time would sum forces or compute them
-    in another way than NumPy, or solve for it."""
-    beside = plan.implicit_step or any(term.fast or term.key == "morse" for term in scene.terms)
-    unknown = any(term.key not in layout.KINDS for term in scene.terms)
-    return unknown or bool(scene.system.is_driven and beside)
+    """Whether the loops cannot solve for a term, or beside one that depends on the time would sum forces or
+    compute them in another way than NumPy."""
+    keys = {term.key for term in scene.terms}
+    if plan.implicit_step:
+        return not keys <= {"wall-spring", "spring", "damping"}
+    beside = "morse" in keys or any(term.fast for term in scene.terms)
+    return scene.system.is_driven and beside
 
 
 def _one(plan: Program, scene: Scene) -> tiles.Job | None:
@@ -136,7 +160,7 @@ def _many(plan: Program, scene: Scene, calls: int) -> tiles.Job:
     n = scene.n
     terms = [terms_of(name, scene) for name in plan.forces]
     slots = layout.slots(terms, scene.m)
-    work = float(sum(n + sum(len(part[-1]) for part in layout.lists(some, scene.m)) for some in terms))
+    work = float(sum(n + sum(len(term) for term in some) for some in terms))
     joined = any(len(k) for *_, (k, _, _), _ in slots)
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
     reach = 0 if slots[0][0] else calls

@@ -139,7 +139,7 @@ def judge(
         unstable = bool(growth[i] * spec.steps >= np.log(UNSTABLE_GROWTH)) and spec.k > 0
         j = int(np.argmax(bad)) if bad.any() else len(bad)
         outcome: Outcome = "silently wrong"
-        reason = f"step {j + 1} is off by {value:.3g} roundings of {bound:g}"
+        reason = f"step {j + 1} is wrong by {value:.3g} roundings (bound {bound:g})"
         if stop and j >= len(bad) - alone:
             reason = f"stopped for no reason that is known here: {stop}"
         if not bad.any() and not stop:
@@ -168,7 +168,7 @@ def _reason(how: Arithmetic, spec: Spec, reasons: Mapping[str, np.ndarray]) -> s
         with np.errstate(over="ignore", under="ignore"):
             kept = abs(np.float32(spec.k))
         if spec.k and not RANGES["single"][0] <= kept <= RANGES["single"][1]:
-            return f"the force constant {spec.k:.3g} is beyond single precision, in which it is kept"
+            return f"the force constant {spec.k:.3g} is beyond single precision, in which it is stored"
     for text, holds in reasons.items():
         if np.all(holds):
             return text

@@ -166,7 +166,7 @@ def _bridged(worst: Sequence[Verdict], pieces: Sequence[Sequence[Verdict]], fram
     if all(v.passed is not None for v in closed):
         return list(worst)
     why = (
-        f"pieces of {frames} frames in all were looked at, and no closed form tells what happened between "
+        f"pieces of {frames} frames in all were looked at, and no formula covers the steps between "
         "them: fewer steps, or a larger record.every"
     )
     return [

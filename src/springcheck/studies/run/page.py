@@ -154,6 +154,6 @@ def _farthest(found: Sequence[Heated]) -> str:
         measured = " in its frames"
     x, kind, method = max((one for one in both if np.isfinite(one[0])), key=lambda one: abs(one[0] - 1))
     if x == 1:
-        return "by every law that is known it has the temperature of the bath"
+        return "in theory it has the temperature of the bath"
     off = f"{100 * abs(x - 1):.2g} % too {'hot' if x > 1 else 'cold'}"
-    return f"the {kind} temperature of {method} is {off}{measured or ' by its law, however long it runs'}"
+    return f"the {kind} temperature of {method} is {off}{measured or ' in theory, however long it runs'}"

@@ -12,11 +12,11 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.compare import Same
-from springcheck.physics.exact import no_reference
+from springcheck.physics.exact import has_true_motion, no_reference
+from springcheck.physics.norm import energy_scale
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
-from springcheck.studies.text import of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
 from springcheck.text.wording import number, rounded_down, seconds
 
@@ -90,9 +90,26 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         *(
             plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
             for run in runs
-            if run.outcome != "complete" or run.message
+            if run.outcome != "complete"
+        ),
+        *(
+            plain(f"  {', '.join(run.method for run in runs if run.message == said)}: {said}")
+            for said in {run.message: None for run in runs if run.outcome == "complete" and run.message}
         ),
     ]
+
+
+def of_energy(scene: Scene) -> str:
+    """Explanation of the column of energies, relative to the scene's `energy_scale`."""
+    system = scene.system
+    changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
+    known = bool(changes) and has_true_motion(scene)
+    off = f"H - H{' exact' if known else '0'}"
+    of = energy_scale(scene.system)[1]
+    over = "|H0|" if of == "initial energy" else f"({of})"
+    part = f"({off})/{over}" if of else off
+    how = f", the {'exact ' * known}{' and '.join(changes)} {'taken off' if known else 'in it'}"
+    return f"{part} where it is largest{how if changes else ''}"
 
 
 def _error(x: float) -> str:
@@ -220,7 +237,7 @@ def faults(broken: Mapping[str, str], verdicts: Sequence[Verdict]) -> Lines:
     for method, about in broken.items():
         mine = [v for v in verdicts if v.method == method and v.passed is not None]
         seen = [v.check for v in mine if not v.passed]
-        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: nothing here sees it"
+        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: no check here detects it"
         out.append(plain(f"{method}, broken on purpose ({about}): {said}", "" if seen else "bold yellow"))
     return out
 

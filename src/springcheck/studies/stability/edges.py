@@ -31,7 +31,7 @@ CLOSING_ROUNDS = 9
 
 
 @np.errstate(all="ignore")
-def radius(maps: Reals, rounding: float) -> tuple[Floats, Floats]:
+def radius(maps: Reals, rounding: float | Floats) -> tuple[Floats, Floats]:
     """Spectral radii (...) of maps (..., 2n, 2n), and bounds on the effect of rounding of the entries.
 
     Where the discriminant of a 2 x 2 map is within its rounding of 0 its eigenvalues count as equal: at a
@@ -54,7 +54,7 @@ def radius(maps: Reals, rounding: float) -> tuple[Floats, Floats]:
     return np.asarray(found, np.float64), np.asarray(moved, np.float64)
 
 
-def grows(maps: Reals, rounding: float) -> np.ndarray:
+def grows(maps: Reals, rounding: float | Floats) -> np.ndarray:
     """Whether powers of each map are unbounded beyond the rounding of its entries, or not finite."""
     found, moved = radius(maps, rounding)
     return np.asarray(~(found <= 1 + np.where(np.isfinite(moved), np.minimum(moved, 1), 0)))
@@ -68,12 +68,13 @@ def eigenvalues(maps: Reals) -> np.ndarray:
 
 
 @np.errstate(all="ignore")
-def first_growth(maps: Maps, grid: Floats, rounding: float) -> float:
+def first_growth(maps: Maps, grid: Floats, rounding: float, of_square: float = 0.0) -> float:
     """Lower end of the first range of growth, to a part in 1e10: 0 from the first point of the grid on,
-    infinity nowhere."""
+    infinity nowhere.  Entries are known to rounding + of_square x**2."""
 
     def wild(x: Floats) -> np.ndarray:
-        return np.asarray(grows(maps(x), rounding).any(axis=-1))
+        known = (rounding + of_square * x * x)[:, None]
+        return np.asarray(grows(maps(x), known).any(axis=-1))
 
     found = wild(grid)
     before = grid[: int(np.argmax(found)) + 1] if found.any() else grid

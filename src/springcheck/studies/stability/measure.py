@@ -31,6 +31,9 @@ from springcheck.studies.stability.result import AGREED, LIMITS, Limit, Stabilit
 GRID = np.geomspace(1e-9, 1e6, 4096)
 """h w of the scan, in a ratio of 1.008."""
 
+OF_STAGES = 8 * float(np.finfo(np.longdouble).eps)
+"""Rounding of the entries of a scheme's map, over (h w)**2."""
+
 BLURRED = 16
 """Factor on the rounding in a second search.  Growth beyond a limit is of some power n of the distance, so
 that rounding hides a distance r**(1/n), which changes by 16**(1/n) - 1 of itself, at least a quarter up to n
@@ -77,8 +80,10 @@ def measure(label: Label) -> Limit:
     """Measure the limit of a method, and find that of its scheme's map at the engine's rounding."""
     scheme, rounding = propagators.scheme_of(label), propagators.noise(label)
     limit = first_growth(partial(propagators.measured, label), GRID, rounding)
+    # an implicit scheme's stages are of the order of (h w)**2 where its map is of the order of 1
     exact, blurred = (
-        first_growth(partial(propagators.theory, label), GRID, times * rounding) for times in (1, BLURRED)
+        first_growth(partial(propagators.theory, label), GRID, times * rounding, OF_STAGES)
+        for times in (1, BLURRED)
     )
     # where rounding hides growth the limit moves with it, by less than this where the stated one is right
     hidden = 0.0 if exact == blurred else 4 * min(abs(exact - blurred), abs(exact - scheme.limit))
@@ -99,10 +104,3 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
     scene = scenefile.load_scene(options.scene)
     path = options.output or f"{scene.name}-stability.h5"
     return record(scene, path, options.method, **keeper.how(options, progress))
-
-
-@keeper.restoring("stability")
-def stored(kept: keeper.Kept) -> Stability:
-    """The study that `record` has saved.  StoreError where the file holds none."""
-    scene, found = keeper.stored_scene(kept.path), kept.listed(LIMITS, "methods")
-    return Stability(scene=scene, limits=found, left_out=kept.left_out)
