@@ -101,7 +101,7 @@ def arrays(file: Any, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]
 def _places(file: Any) -> Iterator[str]:
     """Paths of the datasets of a file, and of the links to other files."""
     groups = [("", file)]
-    for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST):
+    for place, _, node in access.walk(file, DEEPEST):
         if access.is_group(node):
             groups.append((f"{place}/", node))
         elif node is not None:
