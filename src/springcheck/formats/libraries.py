@@ -1,7 +1,4 @@
-"""Files that libraries read: ASE, MDAnalysis, pandas, SciPy.  In a child process (see `store.apart`).
-
-Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Amber's in Angstrom and ps.
-"""
+"""Files that libraries read: ASE, msgspec, pandas, SciPy.  In a child process (see `store.apart`)."""
 
 from __future__ import annotations
 
@@ -10,9 +7,7 @@ from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -46,7 +41,7 @@ def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
 
 
 def read_ase(path: Path, columns: list[str], step: float | None) -> States:
-    """ASE's .traj, with velocities where it has momenta."""
+    """ASE's .traj, with velocities where it has momenta, in Angstrom, fs and u."""
     with _library(path, "ASE", "ase"):
         import ase.io
         from ase import units
@@ -60,35 +55,6 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
         said = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
         t, q = clock(path, said, step, unit="fs"), [atoms.positions for atoms in found]
         return of_frames(path, t, q, v or None, found[0].get_masses())
-
-
-def read_positions(path: Path, columns: list[str], step: float | None) -> States:
-    """A GROMACS .xtc [nm] or a DCD file [Angstrom] by MDAnalysis: positions alone, in single precision."""
-    xtc = path.open("rb").read(4)[:2] == b"\0\0"
-    with _library(path, "MDAnalysis", "'springcheck[md]'"):
-        module, name = ("lib.formats.libmdaxdr", "XTCFile") if xtc else ("coordinates.DCD", "DCDReader")
-        with getattr(import_module(f"MDAnalysis.{module}"), name)(str(path)) as file:
-            found = [
-                (one.time, np.array(one.x if xtc else one.positions)) for one in islice(file, MOST_FRAMES)
-            ]
-    t = np.array([t for t, _ in found]).astype(np.float32)
-    return of_frames(path, t, [q for _, q in found], None, None, 2.0**-24)
-
-
-def read_amber(path: Path, columns: list[str], step: float | None) -> States:
-    """An Amber trajectory in NetCDF 3 by SciPy: Angstrom and ps, in single precision; frames of atoms."""
-    with _library(path, "SciPy", "scipy"):
-        from scipy.io import netcdf_file
-
-        with netcdf_file(str(path), "r", mmap=False, maskandscale=True) as file:
-            known: dict[str, Any] = file.variables
-            found = {name: np.ma.filled(one[:], np.nan) for name, one in known.items()}
-            kinds = [known[name].data.dtype for name in ("coordinates", "velocities") if name in found]
-            coarse = max([2.0**-53, *(np.finfo(x).eps / 2 for x in kinds)])
-    if not {"time", "coordinates"} <= found.keys():
-        raise StoreError(f"{path}: NetCDF without time and coordinates, which Amber's trajectories have")
-    v = found.get("velocities")
-    return of_frames(path, found["time"], found["coordinates"], v, None, coarse)
 
 
 def read_mat(path: Path, columns: list[str], step: float | None) -> States:

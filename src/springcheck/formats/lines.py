@@ -1,4 +1,4 @@
-"""Lines of a text file, gzipped or not, read one by one and bounded by the size of a trajectory."""
+"""Lines of a text file, gzipped or not, and the numbers in their cells."""
 
 from __future__ import annotations
 
@@ -9,39 +9,25 @@ from pathlib import Path
 
 from springcheck.errors import StoreError
 
-LONGEST_LINE = 1 << 24
-"""Characters."""
 MOST_NUMBERS = 1 << 24
 """Numbers of one trajectory."""
-LONGEST_TEXT, MOST_BARE = 1 << 30, 1 << 20
-"""Characters of a text, unpacked, and lines beyond two for each of its numbers: a few kilobytes of gzip
-unpack to gigabytes of comments."""
 
 
 class Lines:
-    """A cursor over the lines of a text; StopIteration at its end."""
+    """The lines of a text, counted; how long it may be is a matter of the process that reads it."""
 
     def __init__(self, path: Path) -> None:
         with path.open("rb") as raw:
-            zipped = raw.read(2) == b"\x1f\x8b"
-        self.path, self.number, self._numbers, self._size = path, 0, 0, 0
-        self._file = (
-            gzip.open(path, "rt", encoding="utf-8-sig") if zipped else path.open(encoding="utf-8-sig")  # noqa: SIM115
-        )
+            opened = gzip.open if raw.read(2) == b"\x1f\x8b" else open
+        self.path, self.number = path, 0
+        self._file = opened(path, "rt", encoding="utf-8-sig")
 
     def __iter__(self) -> Iterator[str]:
         return self
 
     def __next__(self) -> str:
-        line = self._file.readline(LONGEST_LINE)
-        if not line:
-            raise StopIteration
+        line = next(self._file)
         self.number += 1
-        if len(line) == LONGEST_LINE:
-            raise self.wrong(f"is longer than {LONGEST_LINE >> 20} MiB")
-        self._size += len(line)
-        if self._size > LONGEST_TEXT or self.number > MOST_BARE + 2 * self._numbers:
-            raise self.wrong(f"{self.number:,} lines with {self._numbers:,} numbers: leave out the rest")
         return line.rstrip("\r\n")
 
     def take(self) -> str:
@@ -53,14 +39,6 @@ class Lines:
     def wrong(self, what: str) -> StoreError:
         """An error that names file and line."""
         return StoreError(f"{self.path}, line {self.number}: {what}")
-
-    def count(self, numbers: int) -> None:
-        """Count numbers that were read.  StoreError where there are more than a trajectory may have."""
-        self._numbers += numbers
-        if self._numbers > MOST_NUMBERS:
-            raise self.wrong(
-                f"more than {MOST_NUMBERS:,} numbers: keep fewer frames, or choose among the columns"
-            )
 
     def __enter__(self) -> Lines:
         return self

@@ -79,7 +79,6 @@ def _read(path: Path, step: float | None, what: str, begins: Callable[[Lines], I
                         f"the number of atoms changes from {heads[0][2]} to {n}, or their columns"
                     )
                 heads.append(head)
-                lines.count(6 * n)
                 for _ in range(n):
                     cells = lines.take().split()
                     wanted = wanted or _wanted(path, names[: len(cells)])

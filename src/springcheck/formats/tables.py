@@ -32,7 +32,6 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     with Lines(path) as lines:
         for line in lines:
             if len(first) == SHOWN and width > 1 and (row := _plain(line)) and len(row) == width:
-                lines.count(width)
                 numbers.extend(row)
                 continue
             if width == 1 and len(first) == SHOWN:
@@ -67,7 +66,6 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             width = width or len(row)
             if len(row) != width:
                 raise lines.wrong(f"numbers in this row: {len(row)}, in the first: {width}")
-            lines.count(width)
             numbers.extend(row)
             if len(first) < SHOWN:
                 first.append(cells)

@@ -183,7 +183,7 @@ class Journal:
 
     def finished(self) -> dict[str, Path]:
         """Label of each trajectory that is finished and needs no second run -> the part that holds it."""
-        return reading.in_order(Parts.of(self.path, writing=True))
+        return reading.sources(self.path, writing=True)
 
     def draft(self, label: str, scene: Scene) -> Draft:
         """Start to store a trajectory of this scene."""
