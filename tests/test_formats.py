@@ -24,8 +24,7 @@ from ase import Atoms
 from springcheck import driver, formats
 from springcheck.cli import main
 from springcheck.errors import StoreError
-from springcheck.formats.digits import roundoff
-from springcheck.formats.lines import number
+from springcheck.formats.digits import number, roundoff
 from springcheck.formats.tables import read_table
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory

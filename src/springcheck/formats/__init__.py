@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats import digits, libraries, molecular, numbers, tables
+from springcheck.formats import digits, libraries, molecular, tables
 from springcheck.formats.columns import Fixed, Reader, States, fitting, moving
 from springcheck.formats.hdf5 import read_hdf5
 from springcheck.store import apart, checking, files
@@ -72,10 +72,10 @@ def _not_read(what: str) -> Reader:
 
 
 FORMATS: tuple[Format, ...] = (
-    Format("NPY", _starts(b"\x93NUMPY"), numbers.read_npy),
+    Format("NPY", _starts(b"\x93NUMPY"), libraries.read_numpy),
     Format(".xlsx", lambda head, path: re.search(XLSX, head) is not None,
            partial(libraries.read_pandas, "read_excel"), LIBRARY),
-    Format("NPZ", _starts(b"PK\x03\x04"), numbers.read_npz),
+    Format("NPZ", _starts(b"PK\x03\x04"), libraries.read_numpy),
     Format("Parquet", _starts(b"PAR1"), partial(libraries.read_pandas, "read_parquet"), LIBRARY),
     Format("Feather", _starts(b"ARROW1", b"FEA1"), partial(libraries.read_pandas, "read_feather"), LIBRARY),
     Format("MATLAB .mat", _starts(b"MATLAB 5.0"), libraries.read_mat, LIBRARY),

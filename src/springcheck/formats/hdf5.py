@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Floats, States, fitting, kind, named
-from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.formats.columns import MOST_NUMBERS, Floats, States, fitting, kind, named
 from springcheck.formats.numbers import states_of
 from springcheck.store import access
 

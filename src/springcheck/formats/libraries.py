@@ -1,24 +1,28 @@
-"""Files that libraries read: ASE, msgspec, pandas, SciPy.  In a child process (see `store.apart`)."""
+"""Files that libraries read: NumPy, ASE, msgspec, pandas, SciPy; all but the first in a child process."""
 
 from __future__ import annotations
 
 import warnings
+import zipfile
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError, plain
-from springcheck.formats.columns import States
-from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.formats.columns import MOST_NUMBERS, States
 from springcheck.formats.molecular import clock, of_frames
 from springcheck.formats.numbers import of_table, states_of
 
 MOST_FRAMES = 1 << 20
+LARGEST = 16 * MOST_NUMBERS
+"""Bytes of all arrays of a file of NumPy, unpacked."""
 LONGEST_JSON = 1 << 25
 """Bytes of a JSON file: parsed into Python objects it takes some twenty times as much memory."""
 
@@ -38,6 +42,27 @@ def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
     except Exception as error:
         said = plain(" ".join(str(error).split()), 200)
         raise StoreError(f"{path}: {name} cannot read it: {said or type(error).__name__}") from error
+
+
+def read_numpy(path: Path, columns: list[str], step: float | None) -> States:
+    """NPY and NPZ: arrays by their names or fields, or a table (f, c) whose columns are named."""
+    with _library(path, "NumPy"):
+        size = path.stat().st_size
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as packed:
+                size = sum(member.file_size for member in packed.infolist())
+        if size > LARGEST:
+            what = f"{size / 1e6:.0f} MB of arrays, {LARGEST / 1e6:.0f} can be read: keep fewer frames"
+            raise StoreError(f"{path}: {what}")
+        # NumPy leaves a damaged file open; this one is in memory
+        found: Any = np.load(BytesIO(path.read_bytes()), allow_pickle=False)
+        found = dict(found) if hasattr(found, "files") else found
+    if isinstance(found, dict) or found.dtype.names:
+        arrays = found if isinstance(found, dict) else {name: found[name] for name in found.dtype.names}
+        return states_of(path, arrays, columns, step)
+    if found.ndim != 2 or found.dtype.kind not in "fiu":
+        raise StoreError(f"{path}: an array of {found.dtype} and shape {found.shape} is no table of numbers")
+    return of_table(path, found, columns, step)
 
 
 def read_ase(path: Path, columns: list[str], step: float | None) -> States:
