@@ -35,10 +35,6 @@ class Text:
     def __len__(self) -> int:
         return sum(len(text) for text, _ in self.parts)
 
-    @property
-    def style(self) -> str:
-        return self.parts[0][1]
-
 
 def plain(text: str = "", style: str = "") -> Text:
     """A line of text from any file, without control characters."""
@@ -53,7 +49,7 @@ Row = Sequence[Cell] | Text
 class TextTable:
     """A table without rules, as narrow as its cells; only `prose` is wrapped to fit the width.
 
-    Columns that do not fit beside each other are stacked in blocks, each beside the first column: nothing is
+    Columns that do not fit the width are stacked in blocks, each with the first column: nothing is
     truncated, and no terminal has to fold a number.
     """
 
@@ -96,7 +92,7 @@ class TextTable:
             pieces = [whole]
             if title == self.prose and len(whole) > width:
                 broken = textwrap.wrap(str(whole), width, break_long_words=False, break_on_hyphens=False)
-                pieces = [plain(piece, whole.style) for piece in broken]
+                pieces = [plain(piece, whole.parts[0][1]) for piece in broken]
             parts.append((title in self.left or title == self.prose, width, pieces))
         for i in range(max(len(pieces) for _, _, pieces in parts)):
             out: list[tuple[str, str]] = []
@@ -109,7 +105,7 @@ class TextTable:
 
 
 def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
-    """Blocks of columns that fit beside each other, the first one in each block."""
+    """Blocks of columns that fit the width, the first one in each block."""
     blocks, used = [[0]], widths[0]
     for j in range(1, len(widths)):
         if used + COLUMN_GAP + widths[j] > width and len(blocks[-1]) > 1:
