@@ -40,7 +40,7 @@ class Finding(NamedTuple):
     why: str
     sees: Limits = NOT_KNOWN
     holds: bool = True
-    """A further condition of a pass, beside the value within its bound."""
+    """A further condition of a pass, next to the value within its bound."""
 
 
 class Chance(NamedTuple):

@@ -258,7 +258,7 @@ def orientation(bench: Bench) -> Finding | str:
 
 @check("company", family="repeat", requires={"one-step", "explicit", "linear"})
 def company(bench: Bench) -> Finding | str:
-    """A livelier copy beside it, which acts on nothing of it, changes no number of the motion."""
+    """A livelier copy next to it, which acts on nothing of it, changes no number of the motion."""
     alone, scene, n = bench.trajectory, bench.scene, bench.scene.n
     steps = len(alone.t) - 1
     if steps < 1:

@@ -31,7 +31,7 @@ GROUP = "springcheck.engines"
 
 OURS = "springcheck"
 MODULES = ("own", "ase", "lammps", "mujoco", "openmm", "scipy", "sundials")
-"""Our engines, each the ENGINE of the module beside this one."""
+"""Our engines, each the ENGINE of the module next to this one."""
 
 
 class Origin(NamedTuple):

@@ -18,7 +18,7 @@ from springcheck.formats.digits import SHOWN, fixed, number, roundoff
 COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
 MOST_LABELS = 1000
-"""Characters of a row in which labels stand beside numbers, as in ``t=0.1 x=0.2``."""
+"""Characters of a row in which labels stand next to numbers, as in ``t=0.1 x=0.2``."""
 
 
 class Lines:

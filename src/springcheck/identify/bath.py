@@ -21,7 +21,7 @@ MOST = 8
 
 SURE, AGREES, UNKNOWN = 6.0, 1e-6, 3.0
 """Standard errors of what is sure, the relative difference that agrees, and the standard errors of a friction
-up to which it is no number, and kT none beside it."""
+up to which it is no number, and kT none next to it."""
 
 FREE_OF_NOISE = 1e-9
 """Part of a combination that is free of noise, relative to the noise, that double precision leaves."""

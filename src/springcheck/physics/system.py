@@ -60,12 +60,12 @@ class System(Generic[Fields]):
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the exact motion conserves the energy: without friction and drives."""
+        """Whether the exact solution conserves the energy: without friction and drives."""
         return not (self.is_damped or self.is_driven)
 
     @cached_property
     def clocked(self) -> Fields:
-        """The scene with a clock beside its particles (see `driven`), or itself if no force depends on
+        """The scene with a clock next to its particles (see `driven`), or itself if no force depends on
         time."""
         return with_clock(self.scene) if self.is_driven else self.scene
 

@@ -36,7 +36,7 @@ class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
     Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one), `auxiliary` those beside the signal, `log` those of signal and axes
+    draws ("." for an axis without one), `auxiliary` those next to the signal, `log` those of signal and axes
     that want a logarithmic scale.
     """
 

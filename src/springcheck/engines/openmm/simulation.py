@@ -58,7 +58,7 @@ SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-s
 
 
 FAST_STEPS = {"mts": 8}
-"""Evaluations of the fast springs in a step, beside one of the others, by method."""
+"""Evaluations of the fast springs in a step, next to one of the others, by method."""
 
 CUSTOM_STAGES = {
     "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),

@@ -130,7 +130,7 @@ def prepare(
 
 
 def _lacks(plan: Program, scene: Scene) -> bool:
-    """Whether the loops cannot solve for a term, or beside one that depends on the time would sum forces or
+    """Whether the loops cannot solve for a term, or next to one that depends on the time would sum forces or
     compute them in another way than NumPy."""
     keys = {term.key for term in scene.terms}
     if plan.implicit_step:
