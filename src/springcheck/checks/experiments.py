@@ -147,7 +147,7 @@ def reversibility(bench: Bench) -> Finding | str:
     steps = len(out.t) - 1
     case = Case(trajectory=out, scene=bench.scene)
     if out.outcome.status != "complete" or not steps:
-        return "the run did not come to its end"
+        return "the run did not finish"
     state: tuple[Reals, Reals] = (out.q[-1], -out.p[-1])
     if not np.isfinite(state).all():
         return Finding(np.inf, case.roundings, "roundings", ENDED)

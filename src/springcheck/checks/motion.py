@@ -148,7 +148,7 @@ def frequency(case: Case) -> Finding | str:
     shape = schemes.condition(case.law.propagator, case.w)[j]
     angle = bound[-1] * (wide / mode) * shape
     if angle >= 1:
-        return "rounding may be as large as the mode, which has no phase then"
+        return "rounding may be as large as the mode, which then has no phase"
     if angle >= abs(expected):
         return f"{STILL} the whole turn"
     limit = float(angle / abs(expected))

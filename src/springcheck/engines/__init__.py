@@ -236,8 +236,8 @@ def method(label: Label) -> Method:
 
 
 def _methods_meant(name: str, glob: str, bath: bool | None, every: bool) -> list[str]:
-    """The methods of an engine that a glob may match: unless `every` may, the default ones where it does not
-    name methods."""
+    """The methods of an engine that a glob may match: all if `every`, else the default ones unless the
+    glob names methods."""
     found, meant = engine(name), list[str]()
     for of_bath, methods in ((False, found.methods), (True, found.thermostats)):
         if bath in (None, of_bath):
@@ -310,7 +310,7 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return "it multiplies all momenta by one factor, and all initial momenta are 0"
     if of_bath and scene.bath and not scene.bath.friction * scene.step < of_bath.most:
         x = scene.bath.friction * scene.step
-        return f"from friction * step = {of_bath.most:g} on it is no thermostat, and here that is {x:.6g}"
+        return f"from friction * step = {of_bath.most:g} it is no thermostat, and friction * step is {x:.6g}"
     if scene.kind not in what.kinds:
         moved = " and ".join(PLURAL[kind] for kind in sorted(what.kinds))
         others = {kind for other in engine(label.engine).methods.values() for kind in other.kinds}

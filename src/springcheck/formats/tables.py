@@ -175,7 +175,7 @@ def _bare(cell: str) -> str:
 
 
 def _plain(line: str) -> list[float] | None:
-    """The numbers of a row that `float` alone can parse, as most are: some four times as fast."""
+    """The numbers of a row that `float` can parse, as most are: four times as fast."""
     if ";" in line or "\t" in line or "_" in line:
         return None
     try:

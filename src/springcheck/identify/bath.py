@@ -167,7 +167,7 @@ def _numbers(name: str, x: Fitted, m: float | None) -> str:
         numbers.append(("friction c/m", x.friction, x.friction_error))
         numbers.append(("kT/m" if m is None else "kT", x.thermal * scale, x.thermal_error * scale))
     each = [f"{word} {_measured(y, error)}" for word, y, error in numbers if math.isfinite(y)]
-    return f"{name}: " + ", ".join([*each, *["friction c/m too little known to tell kT from it"] * vague])
+    return f"{name}: " + ", ".join([*each, *["friction c/m too uncertain to determine kT"] * vague])
 
 
 def _rounded(x: float, error: float) -> float:

@@ -336,7 +336,7 @@ class System(Generic[Fields]):
         return type(self)(scene)
 
     def without(self, key: str) -> Self:
-        """The facts of the scene without its terms of one kind."""
+        """The system without the terms of one kind."""
         return self.beside(self.scene.derived(terms=tuple(term for term in self.terms if term.key != key)))
 
     @cached_property

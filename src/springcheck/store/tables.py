@@ -151,7 +151,7 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     kept = {name: kind for name, kind in _VERDICT.items() if name in _OWN or name in table.columns}
     columns = [_column(table, name, kind).tolist() for name, kind in kept.items()]
     if len(columns[0]) > MOST_VERDICTS:
-        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than any of ours")
+        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than springcheck writes")
     back = {number: passed for passed, number in _PASSED.items()}
     found = []
     try:

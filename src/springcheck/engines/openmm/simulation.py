@@ -134,7 +134,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
 
 
 def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
-    """A term as its energy in a coordinate x, y or z of a particle, or in the length r of a bond."""
+    """The energy of a term as an expression in x, y or z of a particle, or in the length r of a bond."""
     energy, names = CUSTOM_TERMS[term.key]
     if term.bodies == 2 and scene.places is not None:
         raise MethodError(

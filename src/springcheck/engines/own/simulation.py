@@ -56,7 +56,7 @@ class Own:
 
     @property
     def force_calls(self) -> int:
-        """The forces of all steps so far."""
+        """Number of force evaluations so far."""
         return self._steps and self._first + (self._steps - 1) * self._each
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
