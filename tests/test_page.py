@@ -250,8 +250,8 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
     content = page.gather(tmp_path / "a.h5")
     text = page.html(content)
     assert len(text.encode()) < 500_000
-    assert f"Every {content.stride}th stored frame" in text
-    assert "Every 22nd stored frame" in page.html(replace(content, stride=22))
+    assert f"every {content.stride}th stored frame" in text
+    assert "every 22nd stored frame" in page.html(replace(content, stride=22))
     assert all(run["every"] == content.stride for run in content.data["runs"])
 
 
