@@ -156,9 +156,10 @@ class Started:
         form = f"start(scene, method, label, step{', seed=seed' if seeded else ''})"
         begin = partial(self._engine.start, **seeded)
         self.simulation = guarded(label, begin, scene, self._method, label, scene.step, form=form)
-        if not callable(getattr(self.simulation, "advance", None)):
-            kind = type(self.simulation).__name__
-            raise EngineError(f"{label} failed: its start returned {kind}, which has no advance")
+        for name in ("advance", "force_calls"):
+            if not hasattr(self.simulation, name):
+                kind = type(self.simulation).__name__
+                raise EngineError(f"{label} failed: its start returned {kind}, which has no {name}")
 
     @property
     def origin(self) -> dict[str, str]:
