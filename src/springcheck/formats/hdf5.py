@@ -48,7 +48,9 @@ def read_hdf5(
         meant = {kind(name) for name in table}
         if "q" in meant and ("t" in meant or step is not None):
             try:
-                made[group.removeprefix(ours) or path.name] = _states(path, group, table, units[group], step)
+                made[group.removeprefix(ours) or path.name] = _states(
+                    path, group, table, units.get(group, {}), step
+                )
             except StoreError as error:
                 refused.append(error)
     if not made:
@@ -76,7 +78,8 @@ def _tables(
     for place, values, unit in arrays(file, wanted, most):
         group, name = _named(place)
         table = tables.setdefault(group, {})
-        units.setdefault(group, {})[str(kind(name)).replace("m", "mass")] = unit
+        if unit:
+            units.setdefault(group, {})[{"m": "mass"}.get(str(kind(name)), str(kind(name)))] = unit
         heads = access.find(file, place.replace("_values", "_items")) if place.endswith("_values") else None
         if heads is not None and not isinstance(values, StoreError) and values.ndim == 2:
             # as pandas stores a table
@@ -105,8 +108,9 @@ def _states(
         raise StoreError(f"{path}: positions of {group} are wrapped into a box; write them unwrapped")
     if isinstance(ids, np.ndarray) and ids.ndim > 1 and np.any(ids != ids[:1]):
         raise StoreError(f"{path}: particles of {group} change their order; sort them by their ids")
-    found = states_of(path, table, step=step)
-    return fitting(path, replace(found, units={what: unit for what, unit in units.items() if unit}))
+    return fitting(
+        path, replace(states_of(path, table, step=step, finite=not group.startswith(H5MD)), units=units)
+    )
 
 
 def arrays(
