@@ -237,7 +237,11 @@ class RadialSpring(OnDistances):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kepler(OnDistances):
-    """Attraction as the inverse square: V = -strength/u, u the distance.  strength [M L3/T2]."""
+    """Attraction as the inverse square: V = -strength/u, u the distance.  strength [M L3/T2].
+
+    Verlet's scheme conserves the angular momentum and turns an ellipse of eccentricity e backwards by
+    (pi/8) (4 + e**2)/(1 - e**2)**3 (2 pi h/period)**2 in every orbit; the exact axis does not turn.
+    """
 
     key: ClassVar[str] = "kepler"
     formula: ClassVar[str] = "-strength/u"
