@@ -1,13 +1,13 @@
 """Precession of a Kepler orbit in Verlet's scheme, against the law of its modified Hamiltonian.
 
-Claim: velocity and position Verlet conserve the angular momentum to rounding, and turn the axis of the ellipse
-backwards by (pi/8) (4 + e**2)/(1 - e**2)**3 (h Omega)**2 in every orbit, Omega = 2 pi/period.
+Claim: velocity and position Verlet conserve the angular momentum to rounding.  In every orbit they turn the
+axis of the ellipse backwards by (pi/8) (4 + e**2)/(1 - e**2)**3 (h Omega)**2, Omega = 2 pi/period.
 
 Reason: up to h**4 velocity Verlet conserves T + V + h**2 (v V'' v/12 - F**2/(24 m)) (Hairer, Lubich & Wanner,
-Geometric Numerical Integration (2006), IX.3).  Over an ellipse of semi-axis a both of v V'' v and F**2/m average
-K**2/(m a**4) (3 x**(-5/2) - x**(-3/2))/2, x = 1 - e**2 = L**2/(m K a), so position Verlet, with h**2 (F**2/(12 m)
-- v V'' v/24), turns alike.  The axis turns by the derivative of the average by L times the period.  What is left
-falls like h**2 relative to the law.
+Geometric Numerical Integration (2006), IX.3), and position Verlet T + V + h**2 (F**2/(12 m) - v V'' v/24).
+Over an ellipse of semi-axis a both v V'' v and F**2/m average K**2/(m a**4) (3 x**(-5/2) - x**(-3/2))/2, with
+x = 1 - e**2 = L**2/(m K a), so both schemes turn alike: the average's derivative by L times the period.  What
+is left falls like h**2 relative to the law.
 
 Command: python validation/precession.py        (seconds)
 """
