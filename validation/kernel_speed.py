@@ -42,13 +42,13 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from time import perf_counter, thread_time
+from time import thread_time
 from typing import Any
 
 import numpy as np
 
 from arguments import arguments, script
-from springcheck.engines.own import simulation, solver, tiles
+from springcheck.engines.own import simulation, solver
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, Term, WallSpring
@@ -229,11 +229,25 @@ def doubles(x: Floats) -> Any:
     return x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
+def staggered(rows: Any) -> list[Floats]:
+    """Copies of rows that begin on a cache line each, and no two of them at the same place within a page."""
+    longest = -(-max(len(row) for row in rows) // 8) * 8
+    room = -(-longest // 512) * 512 + 72
+    memory = np.empty(len(rows) * room + 8)
+    begin = -(memory.ctypes.data // memory.itemsize) % 8
+    out = []
+    for row in rows:
+        out.append(memory[begin : begin + len(row)])
+        out[-1][:] = row
+        begin += room
+    return out
+
+
 class Again:
     """A run that starts over in every round: a method that damps or grows must not reach odd numbers."""
 
-    def __init__(self, what: Scene, scheme: str, steps: int, threads: int = 1) -> None:
-        self._start = partial(simulation.prepare, what, scheme, H, compiled=True, threads=threads)
+    def __init__(self, what: Scene, scheme: str, steps: int) -> None:
+        self._start = partial(simulation.prepare, what, scheme, H, compiled=True)
         self._rows = np.empty((2, 1, what.n))
         self._steps = steps
         self._run = self._start()
@@ -278,7 +292,7 @@ def many_springs(c: ctypes.CDLL | None) -> bool:
     many = springs(SPRINGS)
     k = many.terms[0].k  # type: ignore[attr-defined]
     # C gets rows laid out as ours are: on cache lines and apart, or it takes up to four times as long
-    q, p, *rows = tiles.staggered((many.q, many.p, many.m, k, 1 / (1 + H * (H * (k / many.m)))))
+    q, p, *rows = staggered((many.q, many.p, many.m, k, 1 / (1 + H * (H * (k / many.m)))))
 
     def bare(name: str) -> None:
         sizes = ctypes.c_long(SPRING_STEPS), ctypes.c_long(SPRINGS), ctypes.c_double(H)
@@ -298,7 +312,7 @@ def long_chain(c: ctypes.CDLL | None, n: int) -> bool:
     ends = np.array([walls.k[0], walls.at[0], walls.k[1], walls.at[1]])
     _, factors, _ = solver.factors(what, H)
     given = (what.q, what.p, what.m, links.k, links.rest, ends, *factors, np.zeros(n + 1))
-    q, p, *rows = tiles.staggered(given)
+    q, p, *rows = staggered(given)
 
     def bare(name: str) -> None:
         sizes = ctypes.c_long(steps), ctypes.c_long(n), ctypes.c_double(H)
@@ -311,25 +325,6 @@ def long_chain(c: ctypes.CDLL | None, n: int) -> bool:
         for way in (1, 2)
     }
     return against_c(f"A chain of {n:,} masses", what, steps, 1.5, dict(names) if c else {})
-
-
-def threads() -> None:
-    """Wall-clock time of one thread and of two, by a long run."""
-    head("Two threads, wall clock", "ns a mass and step")
-    for title, what, steps in (
-        ("65,536 springs", springs(65_536), 500),
-        ("chain of 1,000,000 masses", chain(1_000_000), 64),
-    ):
-        for scheme in ("semi-implicit-euler", "rk4"):
-            seconds: dict[int, list[float]] = {1: [], 2: []}
-            jobs = {count: Again(what, scheme, steps, count) for count in seconds}
-            for _ in range(5):
-                for count, job in jobs.items():
-                    begin = perf_counter()
-                    job()
-                    seconds[count].append(perf_counter() - begin)
-            for count, found in seconds.items():
-                line(f"{title}, {scheme}, {count}", np.sort(found), what.n * steps)
 
 
 SHORT = """
@@ -368,7 +363,6 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         c = compiled_c(Path(folder)) if shutil.which("cc") else None
         passed = [short_run(), one_spring(c), many_springs(c), *(long_chain(c, n) for n in SIZES)]
-    threads()
     return 0 if all(passed) else 1
 
 

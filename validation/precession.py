@@ -15,6 +15,7 @@ Command: python validation/precession.py        (seconds)
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,8 @@ ALLOWED = 8.0
 def orbit(m: float, strength: float, a: float, e: float, steps: int) -> Scene:
     """An ellipse from its pericentre, in so many steps for each of its periods."""
     momentum = math.sqrt(m * strength * (1 + e) / (a * (1 - e)))
-    law = Kepler.to_points(i=[0, 1], at=[0, 0], strength=[strength] * 2, number=[0, 0])
+    laws: Any = Kepler
+    law = laws.to_points(i=[0, 1], at=[0, 0], strength=[strength] * 2, number=[0, 0])
     step = 2 * math.pi * math.sqrt(m * a**3 / strength) / steps
     start = {"m": [m] * 2, "q": [a * (1 - e), 0], "p": [0, momentum]}
     return load_scene("kepler").replace(**start, terms=(law,), step=step, steps=ORBITS * steps)
