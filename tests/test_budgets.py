@@ -34,7 +34,7 @@ BUDGETS = {
 
 TO_COME = {
     ("physics",): 3800,
-    ("physics/exact",): 1520,
+    ("physics/exact",): 1490,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4900,
     ("identify",): 6600,
