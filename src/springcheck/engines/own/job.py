@@ -19,7 +19,10 @@ class Job:
     arguments: tuple[Any, ...]
     n: int
     work: float
-    is_compiled: bool = False
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        """Fill rows q and p (f, n)."""
+        self.kernel(every, *self.arguments, q, p)
 
     @property
     def compiled(self) -> Job:
@@ -28,12 +31,12 @@ class Job:
 
         none = np.empty((0, self.n))
         kernel = compiled(self.kernel, (1, *self.arguments, none, none))
-        return replace(self, kernel=kernel, is_compiled=True)
+        return replace(self, kernel=kernel)
 
-    def begun(self) -> Callable[..., None]:
-        """A function of (every, qs, ps) that fills rows qs and ps (f, n)."""
-        given = self.arguments if self.is_compiled else _as_lists(self.arguments)
-        return lambda every, q, p: self.kernel(every, *given, q, p)
+    @property
+    def interpreted(self) -> Job:
+        """The job on lists, whose numbers neither warn nor raise where they overflow."""
+        return replace(self, arguments=_as_lists(self.arguments))
 
 
 def with_room(head: tuple[Any, ...], m: Floats, q: Floats, p: Floats, stages: int) -> tuple[Any, ...]:

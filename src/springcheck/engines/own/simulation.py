@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -43,7 +42,7 @@ class Own:
     """
 
     def __init__(
-        self, how: Callable[..., None], calls: tuple[int, int], *, compiled: bool, note: str = ""
+        self, how: Job | vectors.Vectors, calls: tuple[int, int], *, compiled: bool, note: str = ""
     ) -> None:
         self.compiled, self.note = compiled, note
         self._first, self._each = calls
@@ -57,7 +56,7 @@ class Own:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n); overflow fills in inf and nan, silently."""
-        self._how(every, q, p)
+        self._how.advance(every, q, p)
         self._steps += every * len(q)
 
 
@@ -107,16 +106,16 @@ def prepare(
             note = "; ".join(f"{key} is not compiled ({why})" for key, why in whys.items() if why)
             compiled, apart = True, bool(note) or not long
         if plan is None or apart:
-            return Own(vectors.Vectors(found, scene, step).advance, calls, compiled=False, note=note)
+            return Own(vectors.Vectors(found, scene, step), calls, compiled=False, note=note)
         scene = scene.system.clocked
         job = _one(plan, scene) or _many(plan, scene)
     if compiled or (compiled is None and job.work * scene.steps >= WORTH):
         try:
-            job = job.compiled
+            return Own(job.compiled, calls, compiled=True)
         except ImportError:
             if compiled:
                 raise
-    return Own(job.begun(), calls, compiled=job.is_compiled)
+    return Own(job.interpreted, calls, compiled=False)
 
 
 def _lacks(plan: Program, scene: Scene) -> bool:
