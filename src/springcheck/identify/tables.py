@@ -319,7 +319,7 @@ def _samples(row: Row, g: float) -> Any:
 
 def same(one: Row, other: Row) -> bool:
     """Whether two rows have one map."""
-    if bool(one.free) != bool(other.free):
+    if one.free != other.free:
         return False
-    g = 0.3 if one.damped and other.damped else 0.0
+    g = 0.3 if one.free else 0.0
     return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)
