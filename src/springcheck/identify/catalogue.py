@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.identify.elsewhere import ELSEWHERE
 from springcheck.identify.rows import HALF, ONE, Formula, Row, flow, stability
 from springcheck.identify.tables import same
 from springcheck.schemes import SCHEMES, Scheme, matrix, roundings
-from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.text.wording import either
 
 EXPLICIT, IMPLICIT = "explicit friction in the force", "friction implicit in v"
@@ -136,10 +136,14 @@ FRICTION = (
     ),
 )  # fmt: skip
 
+MANY, FAR = 24, 1.0
+"""Stages from which on a map of a long step comes near many others, and largest (h w)**2 of these."""
+
 KNOWN_ELSEWHERE = tuple(
     Row(
         scheme=x.name, title=x.title, stages=x.stages, over=x.over, under=x.under if x.over else (ONE,),
         also=x.also, roundings=8 * max(len(x.over) + len(x.under), len(x.stages)),
+        most=FAR if len(x.stages) > MANY else 3600.0,
     )
     for x in ELSEWHERE.values()
 )  # fmt: skip
@@ -149,6 +153,7 @@ DAMPED_ELSEWHERE = tuple(
         free="friction", law=EXPLICIT if len(row.under) == 1 else IMPLICIT,
     )
     for row in KNOWN_ELSEWHERE
+    if len(row.stages) <= MANY
 )  # fmt: skip
 
 

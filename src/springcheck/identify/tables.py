@@ -254,7 +254,7 @@ class Curves:
             signs = np.sign(np.diff(bends))
         pieces: list[Any] = []
         for (r, parameter), bend, loss, rises in zip(each, bends, losses, signs, strict=True):
-            good = np.isfinite(bend) & np.isfinite(loss)
+            good = np.isfinite(bend) & np.isfinite(loss) & (np.abs(grid) <= table.rows[r].most)
             cut = np.flatnonzero((rises[1:] != rises[:-1]) | ~good[1:-1]) + 1
             for part in np.split(np.arange(len(grid)), cut):
                 # neighbouring pieces share the point between them

@@ -56,7 +56,8 @@ def of_uneven(t: Any, q: Any, p: Any, v: Any, mass: Any, stiffness: Any) -> Iden
 def _named(kept: list[str], names: list[dict[str, float]], m: Floats, weighed: bool) -> Identification:
     each = tuple(
         Candidate(
-            scheme=x, aliases=(), stride=1, step=math.nan, turns=0, omega=tuple(math.sqrt(abs(y[x])) for y in names),
+            scheme=x, aliases=(), stride=1, step=math.nan, turns=0,
+            omega=tuple(math.sqrt(abs(y[x])) for y in names),
             stiffness=tuple(float(w) * y[x] for w, y in zip(m, names, strict=True)) if weighed else None,
             friction=(0.0,) * len(names),
         )
@@ -66,7 +67,7 @@ def _named(kept: list[str], names: list[dict[str, float]], m: Floats, weighed: b
     return Identification(
         verdict="named" if one else "not told apart", scheme=one, nearest=one, candidates=each, stride=1,
         omega=each[0].omega, stiffness=each[0].stiffness, friction=each[0].friction, fits=True,
-        determinant=(math.nan,) * len(names), statement=f"{titles(kept)}, each step of its own length explains every step",
+        determinant=(math.nan,) * len(names), statement=f"{titles(kept)}, in steps of uneven length",
         notes=("the times are not even: each step was compared with a step of its own length",),
     )  # fmt: skip
 
