@@ -136,7 +136,7 @@ FRICTION = (
     ),
 )  # fmt: skip
 
-MANY, FAR = 24, 1.0
+MANY, FAR = 18, 1.0
 """Stages from which on a map of a long step comes near many others, and largest (h w)**2 of these."""
 
 KNOWN_ELSEWHERE = tuple(

@@ -10,7 +10,7 @@ Folk, Comput.  Phys.  Commun. 146 (2002) 188; McLachlan, SIAM J. Sci.  Comput. 1
 Lett. A 146 (1990) 319; Yoshida, Phys.  Lett. A 150 (1990) 262, solution A, in the digits that he prints;
 McLachlan & Atela, Nonlinearity 5 (1992) 541; Tsitouras, Comput.  Math.  Appl. 62 (2011) 770; Blanes & Moan,
 J. Comput.  Appl.  Math. 142 (2002) 313, S6 and S10; Kahan & Li, Math. Comput. 66 (1997) 1089; Calvo &
-Sanz-Serna, SIAM J. Sci.  Comput. 14 (1993) 936; Nielsen, arXiv:1501.04345; Kennedy & Carpenter, NASA
+Sanz-Serna, SIAM J. Sci.  Comput. 14 (1993) 936; Kennedy & Carpenter, NASA
 TM-2016-219173.
 """
 
@@ -152,10 +152,6 @@ _ALL = (
               stages=_alternating("drift", half=(
                   "0.40518861839525227722", "-3/73", "-0.28714404081652408900", "17/59",
                   "0.38195542242127181178"), middle="2179/4307")),
-    Elsewhere(name="aba5o6h", title="ABA5O6H, sixth order in five kicks (Nielsen)", order=6,
-              stages=_alternating("drift", half=(
-                  "0.15585935917621682", "-0.6859195549562167", "-0.007025499091957318",
-                  "0.9966295909529364", "0.35116613991574047"), middle="0.3785799280065607")),
     Elsewhere(name="calvo-sanz4", title="Calvo and Sanz-Serna, fourth order in four stages", order=4,
               stages=tuple(zip(("kick", "drift") * 4 + ("kick",), (
                   "0.061758858135626", "0.205177661542290", "0.33897802655364", "0.403021281604210",
