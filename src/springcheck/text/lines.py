@@ -35,6 +35,11 @@ class Text:
     def __len__(self) -> int:
         return sum(len(text) for text, _ in self.parts)
 
+    @property
+    def style(self) -> str:
+        """That of its first part; the page's template reads it."""
+        return self.parts[0][1]
+
 
 def plain(text: str = "", style: str = "") -> Text:
     """A line of text from any file, without control characters."""
@@ -92,7 +97,7 @@ class TextTable:
             pieces = [whole]
             if title == self.prose and len(whole) > width:
                 broken = textwrap.wrap(str(whole), width, break_long_words=False, break_on_hyphens=False)
-                pieces = [plain(piece, whole.parts[0][1]) for piece in broken]
+                pieces = [plain(piece, whole.style) for piece in broken]
             parts.append((title in self.left or title == self.prose, width, pieces))
         for i in range(max(len(pieces) for _, _, pieces in parts)):
             out: list[tuple[str, str]] = []
