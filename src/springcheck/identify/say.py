@@ -196,7 +196,12 @@ def of_another_friction(seen: Seen, joints: list[Joint]) -> Identification:
     elif not seen.friction:
         cause = f"{whose}, but with a friction, c = {c:.6g} where 0 is stated"
     else:
-        cause = f"{whose}, but with a friction {c / seen.friction:.4g} times the stated"
+        share = c / seen.friction / (first.parts[0].g * first.stride)
+        every = sorted(share * x.parts[0].g * x.stride for x in joints)
+        digits = 4 if every[-1] - every[0] < 1e-4 * every[0] else 3
+        low, high = (f"{every[i]:.{digits}g}" for i in (0, -1))
+        times = low if low == high else f"{low} to {high}"
+        cause = f"{whose}, but with a friction {times} times the stated"
     remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
     return _refuted(seen, Explanation(cause, remedy, local=True))
 

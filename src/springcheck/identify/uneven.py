@@ -14,8 +14,8 @@ from springcheck.identify.tables import table
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.text.wording import either
 
-FEWEST, ALIKE = 12, 1e-6
-"""Fewest frames, and the relative difference of intervals that are one."""
+FEWEST, ALIKE, OF_STIFFNESS = 12, 1e-6, 1e-7
+"""Fewest frames, the relative difference of intervals that are one, and of stiffnesses that agree."""
 
 SHARES = (0.5, 1.0, 0.25, 0.75, 2.0, 1.5, 4.0)
 """First guesses of the step that was taken in place of an interval, over it."""
@@ -46,6 +46,11 @@ def of_uneven(t: Any, q: Any, p: Any, v: Any, mass: Any, stiffness: Any) -> Iden
     each = [_Steps(times, positions[:, j], speeds[:, j]) for j in moving]
     names = [one.taken(None if k is None else float(k[j])) for j, one in zip(moving, each, strict=True)]
     kept = [x for x in (names[0] if names else {}) if all(x in y for y in names)]
+    if kept and k is not None:
+        ratio = max((y[kept[0]] / k[j] for j, y in zip(moving, names, strict=True)), key=lambda x: abs(x - 1))
+        if abs(ratio - 1) > OF_STIFFNESS:
+            cause = f"{titles(kept)}, in steps of uneven length, but of a spring {ratio:.9g} times as stiff"
+            return nothing([Explanation(f"{cause} as stated", local=True)], n)
     if kept:
         return _named(kept, names, m[moving], mass is not None)
     clipped = [one.of_another_step() for one in each]
