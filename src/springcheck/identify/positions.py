@@ -13,8 +13,8 @@ from springcheck.identify.catalogue import FRICTION, PLAIN, titles
 from springcheck.identify.compare import Freedom, Joint, Match, compare
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.identify.rows import Row, power, unit
-from springcheck.identify.say import answer
+from springcheck.identify.rows import Row
+from springcheck.identify.say import answer, of_another_friction
 from springcheck.identify.search import FEW, explained
 from springcheck.identify.seeing import see
 from springcheck.identify.unknown import kind_of_map
@@ -31,12 +31,7 @@ ALONE = (
 @cache
 def _shown(row: Row, steps: int) -> Row:
     """The row of this many steps whose velocities are the last displacements over the interval."""
-
-    def entries(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
-        m = power(unit(row, a / steps**2, g / steps), np.full(len(a), steps))
-        return m[:, 0, 0], m[:, 0, 1] / steps, m[:, 1, 0] * steps, m[:, 1, 1]
-
-    return replace(row, view="earlier", inner=replace(row, formula=entries, stages=(), over=()))
+    return replace(row, view="earlier", inner=row, steps=steps)
 
 
 def identify_positions(
@@ -57,14 +52,20 @@ def identify_positions(
     free = Freedom(jitter=record.jitter)
     strides = FEW if seen.stride is None or seen.stride < 1 else range(seen.stride, seen.stride + 1)
     joints: list[Joint] = []
+    others: list[Joint] = []
     for rows, steps in (*((PLAIN, s) for s in strides), *((FRICTION, s) for s in strides)):
         if joints or (rows is FRICTION and friction == 0):
             break
         found = compare(seen.maps, free, [_shown(row, steps) for row in rows], range(1, 2))
-        joints = [x for x in found if seen.off(x) <= 0 and seen.rubs(x) <= 0 and explained(seen, x)]
-        joints = [
-            replace(x, stride=steps, parts=tuple(_of_a_step(y, steps) for y in x.parts)) for x in joints
+        good = [
+            replace(x, stride=steps, parts=tuple(_of_a_step(y, steps) for y in x.parts))
+            for x in found
+            if seen.off(x) <= 0 and explained(seen, x)
         ]
+        joints = [x for x in good if seen.rubs(x) <= 0]
+        others = others or good
+    if not joints and others and seen.stiffness is not None:
+        return of_another_friction(seen, others)
     if not joints:
         return _none(seen.maps[0].excess, kind_of_map(seen.maps[0]), len(seen.maps))
     names = list(dict.fromkeys(x.row.scheme for x in joints))

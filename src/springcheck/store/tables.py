@@ -36,7 +36,7 @@ class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
     Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one), `auxiliary` those beside the signal, `log` those of signal and axes
+    draws ("." for an axis without one), `auxiliary` those next to the signal, `log` those of signal and axes
     that want a logarithmic scale.
     """
 
@@ -94,7 +94,7 @@ def read(group: Any, name: str) -> Table:
     except ValueError:
         style = {}
     scales = [*_listed(style.get("axes_scale_types")), style.get("signal_scale_type")]
-    columns = access.columns(group)
+    columns = {column: access.dataset_at(group, column) for column in access.members(group)}
     units = {column: access.attributes(dataset).get("unit") for column, dataset in columns.items()}
     return Table(
         name=name,
@@ -118,7 +118,7 @@ def names(file: Any) -> Iterator[str]:
     def into(place: str, node: Any) -> bool:
         return place not in RESERVED and not _is_table(node)
 
-    for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST, into):
+    for place, _, node in access.walk(file, DEEPEST, into):
         if place not in RESERVED and _is_table(node):
             yield place
 
@@ -151,7 +151,7 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     kept = {name: kind for name, kind in _VERDICT.items() if name in _OWN or name in table.columns}
     columns = [_column(table, name, kind).tolist() for name, kind in kept.items()]
     if len(columns[0]) > MOST_VERDICTS:
-        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than any of ours")
+        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than springcheck writes")
     back = {number: passed for passed, number in _PASSED.items()}
     found = []
     try:

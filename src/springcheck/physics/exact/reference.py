@@ -246,7 +246,7 @@ class ReferenceMotion:
 
     @np.errstate(all="ignore")
     def _reach(self, sign: int, end: Any) -> None:
-        """Integrate up to a time in units of the step, and compare."""
+        """Integrate up to a time in steps, three times, and compare."""
         if len(self.paths.get(sign, ())) == 1 and self.known[sign][0][-1] < end:
             # read, and too short
             del self.paths[sign], self.known[sign]

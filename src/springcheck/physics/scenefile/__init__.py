@@ -32,11 +32,15 @@ def names() -> tuple[str, ...]:
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
-    """Read a shipped scene by name, or any scene file by path.
+    """Read a shipped scene by its name, or a scene file by its path.
 
-    Raises:
-        SceneError: no such scene, or an error in the file; it names the field, its value and the accepted
-            ones.
+    >>> load_scene("spring")
+    Scene('spring', 1 particle, 1 wall-spring, 200 steps of 0.1)
+
+    Raises
+    ------
+    SceneError
+        No such scene, or an error in the file: its field, its value, and what is accepted.
     """
     path, text = _read(name_or_path)
     return parse(text, name=path.stem, where=str(path))
@@ -149,7 +153,7 @@ def _explain(message: str, data: Any) -> str:
         return f"{field or 'the scene'}: it {said}" + f"; its fields are {', '.join(known)}" * bool(known)
     wanted = re.sub(r", got .*|^Expected ", "", what).replace(" | null", "")
     if wanted.startswith("`array`") and ((table and "[" not in field) or isinstance(found, dict)):
-        return f"{field}: there may be several of it: write [[{field}]], in double brackets, for each"
+        return f"{field}: write [[{field}]], in double brackets, for each one"
     if isinstance(found, list) and wanted == "`object`" and "[" not in field:
         return f"{field}: there is one of it: write [{field}], in single brackets, once"
     shown = str(found).lower() if isinstance(found, bool) else repr(found)

@@ -70,7 +70,7 @@ def _holds_runs(path: Path) -> bool:
 
 
 def stored(path: Path) -> Stored:
-    """Data of a run that are stored beside its trajectories."""
+    """Data of a run that are stored next to its trajectories."""
     # an unfinished run has trajectories in its journal, and no file yet
     if not path.is_file():
         return Stored(path=path, verdicts=(), comparison=None)
@@ -133,7 +133,9 @@ def run(
     command = keeper.command("run", labels, scene.digest, *options)
     with keeper.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
-        keeper.need_space(journal.path, keeper.size(scene) * (len(labels) + len(wrong) - len(resumed)))
+        # each twice: until the store is in its place the parts stay
+        many = 2 * (len(labels) + len(wrong)) - len(resumed)
+        keeper.need_space(journal.path, keeper.size(scene) * many)
         for label in tuple(labels):
             if str(label) in resumed:
                 continue
