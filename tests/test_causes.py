@@ -131,7 +131,7 @@ def said(scene: Scene, run: Trajectory) -> str:
     """What a failed judgement says that the states show; "" of one that did not fail."""
     verdicts = checks.explained(scene, run, checks.judge(scene, run), files.shown)
     why = next((v.why for v in verdicts if v.passed is False and v.check in checks.TELLING), "")
-    return why.partition(checks.STATES_SHOW)[2]
+    return why.partition(checks.DIAGNOSIS)[2]
 
 
 VERLET = "own:velocity-verlet"

@@ -244,7 +244,7 @@ def test_a_reader_that_crashes_or_never_ends_is_told(tmp_path: Path, monkeypatch
         (tmp_path / "broken.py").write_text(body)
         path.write_text(body)
         with pytest.raises(StoreError, match=why):
-            apart.tried(path, "broken")
+            apart.trust(path, "broken")
 
 
 def test_no_file_is_believed_whatever_stands_in_it(

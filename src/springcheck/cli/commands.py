@@ -288,8 +288,8 @@ def _doctor(options: Namespace) -> int:
 
 
 FORMATS = (
-    "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, DCD, GROMACS .xtc, .trr, "
-    "Amber NetCDF, ASE .traj, .xyz, text tables; texts also gzipped"
+    "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, .trr, ASE .traj, "
+    ".xyz, text tables; texts also gzipped"
 )
 """Formats that `springcheck.formats` reads, which is not imported for this text."""
 

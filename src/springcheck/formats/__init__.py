@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats import digits, libraries, molecular, numbers, tables
+from springcheck.formats import digits, libraries, molecular, tables
 from springcheck.formats.columns import Fixed, Reader, States, fitting, moving
 from springcheck.formats.hdf5 import read_hdf5
 from springcheck.store import apart, checking, files
@@ -72,19 +72,19 @@ def _not_read(what: str) -> Reader:
 
 
 FORMATS: tuple[Format, ...] = (
-    Format("NPY", _starts(b"\x93NUMPY"), numbers.read_npy),
+    Format("NPY", _starts(b"\x93NUMPY"), libraries.read_numpy),
     Format(".xlsx", lambda head, path: re.search(XLSX, head) is not None,
            partial(libraries.read_pandas, "read_excel"), LIBRARY),
-    Format("NPZ", _starts(b"PK\x03\x04"), numbers.read_npz),
+    Format("NPZ", _starts(b"PK\x03\x04"), libraries.read_numpy),
     Format("Parquet", _starts(b"PAR1"), partial(libraries.read_pandas, "read_parquet"), LIBRARY),
     Format("Feather", _starts(b"ARROW1", b"FEA1"), partial(libraries.read_pandas, "read_feather"), LIBRARY),
     Format("MATLAB .mat", _starts(b"MATLAB 5.0"), libraries.read_mat, LIBRARY),
     Format("JSON", _is_json, libraries.read_json, LIBRARY),
     Format("LAMMPS dump", _starts(b"ITEM: "), molecular.read_lammps, LINES),
-    Format("DCD", lambda head, path: head[4:8] == b"CORD", libraries.read_positions, LIBRARY),
-    Format("GROMACS .xtc", _starts(b"\0\0\x07\xcb", b"\0\0\x07\xe7"), libraries.read_positions, LIBRARY),
+    Format("", lambda head, path: head[4:8] == b"CORD", _not_read("a DCD file, which holds positions alone")),
+    Format("", _starts(b"\0\0\x07\xcb", b"\0\0\x07\xe7"), _not_read("an .xtc file: use .trr instead")),
     Format(".trr", _starts(b"\0\0\x07\xc9"), molecular.read_trr),
-    Format("Amber NetCDF", _starts(b"CDF\x01", b"CDF\x02"), libraries.read_amber, LIBRARY),
+    Format("", _starts(b"CDF\x01", b"CDF\x02"), _not_read("NetCDF: write its arrays as NPZ or HDF5")),
     Format("ASE .traj", _starts(b"- of Ulm"), libraries.read_ase, LIBRARY),
     Format(".xyz", lambda head, path: molecular.is_xyz(head), molecular.read_xyz, LINES),
     Format("", _starts(b"LAMMPS ("), _not_read("a log of LAMMPS: dump x y z vx vy vz instead"), LINES),

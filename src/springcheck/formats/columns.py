@@ -45,6 +45,8 @@ FEWEST_SINGLE, FEW_ROWS, SHORT = 8, 1000, 0xFFF
 """Evidence that numbers are of single precision: so many different ones in so many rows, and bits among the
 last of the 24 set in some.  None is set in numbers that no step has rounded, such as 0.75."""
 
+MOST_NUMBERS = 1 << 24
+"""Numbers of one trajectory."""
 LONGEST_NAME = 200
 """Characters of a column's name; patterns take the square of it."""
 SLOPE = 0.2

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.formats.columns import Fixed, Floats, States
-from springcheck.formats.lines import number
 
 SHOWN = 1000
 """Rows whose digits are counted."""
@@ -20,6 +19,24 @@ FEWEST_LONG = 20
 AS_WIDE = 0.75
 """Share of the numbers of a column that are as wide as any where all were cut off at one width: of others the
 last digits are zeros by chance, and may be left out."""
+
+
+BARE_EXPONENT = re.compile(r"^([+-]?\d*\.\d*)([+-]\d{3})$")
+"""Fortran omits the letter of an exponent of three digits."""
+
+
+def number(cell: str) -> float:
+    """The number in a cell, also with Fortran's exponents (1.5D+00, 1.5-100).  ValueError where there is
+    none."""
+    if "_" in cell:
+        # Python's own way to write a number
+        raise ValueError(f"could not convert string to float: {cell!r}")
+    try:
+        return float(cell)
+    except ValueError:
+        if len(cell) < 64:
+            return float(BARE_EXPONENT.sub(r"\1e\2", cell).replace("d", "e").replace("D", "e"))
+        raise
 
 
 def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Floats, States, fitting, kind, named
-from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.formats.columns import MOST_NUMBERS, Floats, States, fitting, kind, named
 from springcheck.formats.numbers import states_of
 from springcheck.store import access
 
@@ -101,7 +100,7 @@ def arrays(file: Any, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]
 def _places(file: Any) -> Iterator[str]:
     """Paths of the datasets of a file, and of the links to other files."""
     groups = [("", file)]
-    for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST):
+    for place, _, node in access.walk(file, DEEPEST):
         if access.is_group(node):
             groups.append((f"{place}/", node))
         elif node is not None:

@@ -1,16 +1,14 @@
-"""Files that libraries read: ASE, MDAnalysis, pandas, SciPy.  In a child process (see `store.apart`).
-
-Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Amber's in Angstrom and ps.
-"""
+"""Files that libraries read: NumPy, ASE, msgspec, pandas, SciPy; all but the first in a child process."""
 
 from __future__ import annotations
 
 import warnings
+import zipfile
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from itertools import islice
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +16,13 @@ import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError, plain
-from springcheck.formats.columns import States
-from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.formats.columns import MOST_NUMBERS, States
 from springcheck.formats.molecular import clock, of_frames
 from springcheck.formats.numbers import of_table, states_of
 
 MOST_FRAMES = 1 << 20
+LARGEST = 16 * MOST_NUMBERS
+"""Bytes of all arrays of a file of NumPy, unpacked."""
 LONGEST_JSON = 1 << 25
 """Bytes of a JSON file: parsed into Python objects it takes some twenty times as much memory."""
 
@@ -45,8 +44,29 @@ def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
         raise StoreError(f"{path}: {name} cannot read it: {said or type(error).__name__}") from error
 
 
+def read_numpy(path: Path, columns: list[str], step: float | None) -> States:
+    """NPY and NPZ: arrays by their names or fields, or a table (f, c) whose columns are named."""
+    with _library(path, "NumPy"):
+        size = path.stat().st_size
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as packed:
+                size = sum(member.file_size for member in packed.infolist())
+        if size > LARGEST:
+            what = f"{size / 1e6:.0f} MB of arrays, {LARGEST / 1e6:.0f} can be read: keep fewer frames"
+            raise StoreError(f"{path}: {what}")
+        # NumPy leaves a damaged file open; this one is in memory
+        found: Any = np.load(BytesIO(path.read_bytes()), allow_pickle=False)
+        found = dict(found) if hasattr(found, "files") else found
+    if isinstance(found, dict) or found.dtype.names:
+        arrays = found if isinstance(found, dict) else {name: found[name] for name in found.dtype.names}
+        return states_of(path, arrays, columns, step)
+    if found.ndim != 2 or found.dtype.kind not in "fiu":
+        raise StoreError(f"{path}: an array of {found.dtype} and shape {found.shape} is no table of numbers")
+    return of_table(path, found, columns, step)
+
+
 def read_ase(path: Path, columns: list[str], step: float | None) -> States:
-    """ASE's .traj, with velocities where it has momenta."""
+    """ASE's .traj, with velocities where it has momenta, in Angstrom, fs and u."""
     with _library(path, "ASE", "ase"):
         import ase.io
         from ase import units
@@ -60,35 +80,6 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
         said = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
         t, q = clock(path, said, step, unit="fs"), [atoms.positions for atoms in found]
         return of_frames(path, t, q, v or None, found[0].get_masses())
-
-
-def read_positions(path: Path, columns: list[str], step: float | None) -> States:
-    """A GROMACS .xtc [nm] or a DCD file [Angstrom] by MDAnalysis: positions alone, in single precision."""
-    xtc = path.open("rb").read(4)[:2] == b"\0\0"
-    with _library(path, "MDAnalysis", "'springcheck[md]'"):
-        module, name = ("lib.formats.libmdaxdr", "XTCFile") if xtc else ("coordinates.DCD", "DCDReader")
-        with getattr(import_module(f"MDAnalysis.{module}"), name)(str(path)) as file:
-            found = [
-                (one.time, np.array(one.x if xtc else one.positions)) for one in islice(file, MOST_FRAMES)
-            ]
-    t = np.array([t for t, _ in found]).astype(np.float32)
-    return of_frames(path, t, [q for _, q in found], None, None, 2.0**-24)
-
-
-def read_amber(path: Path, columns: list[str], step: float | None) -> States:
-    """An Amber trajectory in NetCDF 3 by SciPy: Angstrom and ps, in single precision; frames of atoms."""
-    with _library(path, "SciPy", "scipy"):
-        from scipy.io import netcdf_file
-
-        with netcdf_file(str(path), "r", mmap=False, maskandscale=True) as file:
-            known: dict[str, Any] = file.variables
-            found = {name: np.ma.filled(one[:], np.nan) for name, one in known.items()}
-            kinds = [known[name].data.dtype for name in ("coordinates", "velocities") if name in found]
-            coarse = max([2.0**-53, *(np.finfo(x).eps / 2 for x in kinds)])
-    if not {"time", "coordinates"} <= found.keys():
-        raise StoreError(f"{path}: NetCDF without time and coordinates, which Amber's trajectories have")
-    v = found.get("velocities")
-    return of_frames(path, found["time"], found["coordinates"], v, None, coarse)
 
 
 def read_mat(path: Path, columns: list[str], step: float | None) -> States:

@@ -14,9 +14,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Fixed, Floats, States, times
-from springcheck.formats.digits import SHOWN, fixed, roundoff
-from springcheck.formats.lines import MOST_NUMBERS, Lines, number
+from springcheck.formats.columns import MOST_NUMBERS, Fixed, Floats, States, times
+from springcheck.formats.digits import SHOWN, fixed, number, roundoff
+from springcheck.formats.tables import Lines
 
 R, V, P = ("x", "y", "z"), ("vx", "vy", "vz"), ("px", "py", "pz")
 IMAGES = "ix", "iy", "iz"
@@ -79,7 +79,6 @@ def _read(path: Path, step: float | None, what: str, begins: Callable[[Lines], I
                         f"the number of atoms changes from {heads[0][2]} to {n}, or their columns"
                     )
                 heads.append(head)
-                lines.count(6 * n)
                 for _ in range(n):
                     cells = lines.take().split()
                     wanted = wanted or _wanted(path, names[: len(cells)])

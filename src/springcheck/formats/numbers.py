@@ -1,60 +1,31 @@
-"""Arrays by their names, or the columns of one array: of NPY and NPZ files, and of what others read."""
+"""Arrays by their names, or the columns of one array."""
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springcheck.errors import StoreError, nearest, plain
-from springcheck.formats.columns import Floats, States, is_rate, kind, kinds, listed, named, split
-from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.formats.columns import (
+    Floats,
+    States,
+    is_rate,
+    kind,
+    kinds,
+    listed,
+    named,
+    split,
+)
 from springcheck.physics.arrays import roundoff
 
-LARGEST = 16 * MOST_NUMBERS
-"""Bytes of all arrays of a file, unpacked."""
 STATES = "y", "u", "state", "states", "sol", "solution", "z"
 """Names of one array of positions and velocities, as SciPy's ``solve_ivp`` has it."""
 BETWEEN = "dt", "h", "delta_t", "timestep", "time_step"
 """Names of the time between frames, a single number."""
-
-
-def _load(path: Path) -> Any:
-    try:
-        if zipfile.is_zipfile(path):
-            with zipfile.ZipFile(path) as packed:
-                found = sum(member.file_size for member in packed.infolist())
-        else:
-            found = path.stat().st_size
-        if found <= LARGEST:
-            # NumPy leaves a damaged file open; this one is in memory
-            loaded = np.load(BytesIO(path.read_bytes()), allow_pickle=False)
-            return dict(loaded) if hasattr(loaded, "files") else loaded
-    except Exception as error:
-        raise StoreError(f"{path}: NumPy cannot read it: {' '.join(str(error).split())[:200]}") from error
-    raise StoreError(
-        f"{path}: {found / 1e6:.0f} MB of arrays, {LARGEST / 1e6:.0f} can be read: keep fewer frames"
-    )
-
-
-def read_npz(path: Path, columns: list[str], step: float | None) -> States:
-    """Arrays t (f,), q and p or v (f,) or (f, n), and perhaps m (n,), by their names or as `columns` say."""
-    return states_of(path, _load(path), columns, step)
-
-
-def read_npy(path: Path, columns: list[str], step: float | None) -> States:
-    """A structured array with named fields, or a table (f, c) whose columns are named."""
-    found = _load(path)
-    if found.dtype.names:
-        return states_of(path, {name: found[name] for name in found.dtype.names}, columns, step)
-    if found.ndim != 2 or not np.issubdtype(found.dtype, np.number) or np.iscomplexobj(found):
-        raise StoreError(f"{path}: an array of {found.dtype} and shape {found.shape} is no table of numbers")
-    return of_table(path, found, columns, step)
 
 
 def of_table(path: Path, found: Any, names: Sequence[str], step: float | None = None) -> States:
@@ -130,14 +101,11 @@ def _state_vector(arrays: Mapping[str, Any], step: float | None) -> tuple[Mappin
     y = y.T if len(y) != frames else y
     n, odd = divmod(y.shape[1], 2)
     clock: Floats = np.arange(frames) * (step or 1.0) if t is None else np.asarray(t, np.float64)
-    if odd or len(y) != frames or not (t is not None or step) or not _is_state(clock, y, n):
+    known = not odd and len(y) == frames and (t is not None or step)
+    if not known or not all(is_rate(clock, *np.asarray(y[:, [i, n + i]], float).T) for i in range(n)):
         return arrays, step
     rest = {name: a for name, a in arrays.items() if name != both[0]}
     return {**rest, "q": y[:, :n], "v": y[:, n:]}, step
-
-
-def _is_state(t: Floats, y: Any, n: int) -> bool:
-    return all(is_rate(t, *np.asarray(y[:, [i, n + i]], np.float64).T) for i in range(n))
 
 
 def _may_be_left_out(path: Path, name: str, a: Any, rows: int) -> None:

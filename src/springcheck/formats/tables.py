@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +13,46 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.formats.columns import Floats, States, counts_steps, kinds, listed, named, split, times
-from springcheck.formats.digits import SHOWN, fixed, roundoff
-from springcheck.formats.lines import Lines, number
+from springcheck.formats.digits import SHOWN, fixed, number, roundoff
 
 COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
 MOST_LABELS = 1000
 """Characters of a row in which labels stand beside numbers, as in ``t=0.1 x=0.2``."""
+
+
+class Lines:
+    """The lines of a text, counted; how long it may be is a matter of the process that reads it."""
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as raw:
+            opened = gzip.open if raw.read(2) == b"\x1f\x8b" else open
+        self.path, self.number = path, 0
+        self._file = opened(path, "rt", encoding="utf-8-sig")
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        line = next(self._file)
+        self.number += 1
+        return line.rstrip("\r\n")
+
+    def take(self) -> str:
+        """The next line of a frame.  StoreError at the end of the file."""
+        for line in self:
+            return line
+        raise self.wrong("is damaged or cut off")
+
+    def wrong(self, what: str) -> StoreError:
+        """An error that names file and line."""
+        return StoreError(f"{self.path}, line {self.number}: {what}")
+
+    def __enter__(self) -> Lines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
@@ -32,7 +66,6 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     with Lines(path) as lines:
         for line in lines:
             if len(first) == SHOWN and width > 1 and (row := _plain(line)) and len(row) == width:
-                lines.count(width)
                 numbers.extend(row)
                 continue
             if width == 1 and len(first) == SHOWN:
@@ -67,7 +100,6 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             width = width or len(row)
             if len(row) != width:
                 raise lines.wrong(f"numbers in this row: {len(row)}, in the first: {width}")
-            lines.count(width)
             numbers.extend(row)
             if len(first) < SHOWN:
                 first.append(cells)
