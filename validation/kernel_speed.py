@@ -80,7 +80,7 @@ LOOP(one_explicit_euler, double x = q; q = x + (p / m) * h; p = p + (-k * x) * h
 LOOP(one_semi_implicit_euler, p = p + (-k * q) * h; q = q + (p / m) * h;)
 LOOP(one_implicit_euler, p = (p + (-k * q) * h) * d; q = q + (p / m) * h;)
 
-/* of order 4: a velocity and a force of each stage; the splitting's numbers are 1/(2 - 2**(1/3)) and the rest */
+/* of order 4: a velocity and a force of each stage; X1 is 1/(2 - 2**(1/3)) */
 #define RK4(q, p, m, k) \\
     double v1 = p / m, f1 = -k * q, u = q + a * v1, w = p + a * f1; \\
     double v2 = w / m, f2 = -k * u; u = q + a * v2; w = p + a * f2; \\
