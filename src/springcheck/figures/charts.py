@@ -1,4 +1,4 @@
-"""Charts as plain data: what a study shows in figures (`render`) and in the report page beside its text.
+"""Charts as plain data: what a study shows in figures (`render`) and in the report page next to its text.
 
 The results of studies have them (`banks`).  Numbers are the stored doubles; `plain` makes of a bank
 what JSON can hold.
@@ -51,7 +51,7 @@ class Curve:
     line: bool = True
     marks: bool = False
     notes: Sequence[str] = ()
-    """Annotation of each point beside its numbers."""
+    """Annotation of each point next to its numbers."""
     open: Sequence[bool] = ()
     """Which points are estimates: these have hollow marks, all others filled ones."""
     title: str = ""
@@ -74,7 +74,7 @@ class Tiles:
     """Name and shade of each: good, wild, limit, refused, wrong."""
     rows: Sequence[Sequence[int]]
     notes: Sequence[Sequence[str]] = ()
-    """Annotation of each tile beside its kind; none by default."""
+    """Annotation of each tile next to its kind; none by default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Naming:
-    """The name of a curve where it is well separated, in its colour; at x = 1 beside the axes."""
+    """The name of a curve where it is well separated, in its colour; at x = 1 next to the axes."""
 
     text: str
     group: str
@@ -134,7 +134,7 @@ class Bank:
     on: Sequence[str] | None = None
     """Series drawn at first; all by default."""
     columns: int = 0
-    """Charts beside each other in a figure; by default as many as suit it."""
+    """Charts side by side in a figure; by default as many as suit it."""
     foot: str = ""
     """Small print below its figure."""
     size: tuple[float, float] | None = None

@@ -54,7 +54,7 @@ def _named(chart: Chart, *, by_name: bool = False) -> list[Place]:
 
 
 def at_ends(chart: Chart, *, height: float = NAME_HIGH) -> Chart:
-    """A chart with labels at the ends of its curves over time, beside the axes.
+    """A chart with labels at the ends of its curves over time, next to the axes.
 
     They are moved apart by the height of a line of text.
     """

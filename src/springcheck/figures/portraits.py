@@ -27,7 +27,7 @@ CHORD = 0.015
 
 JUMP, MANY_POINTS, TO_AND_FRO = 0.3, 1000, 0.25
 """Distance of two points, in half axes, that is a jump in a curve of many points; and the fraction of all
-frames from which on a run is said to jump to and fro."""
+frames from which on a run is taken to jump to and fro."""
 
 STEEP, START_SHOWN = 30.0, 3.0
 """Reach, in medians, from which on a motion runs away; and what is shown of it, in reaches of its start."""
@@ -225,7 +225,7 @@ def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -
 
 def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Runs) -> Bank:
     """Positions over time: a row for each view; of many periods the first and the last.  `whole`: the runs
-    from start to end, of which errors are said."""
+    from start to end, of which errors are given."""
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"

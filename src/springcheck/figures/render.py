@@ -68,7 +68,7 @@ MOST_TICKS, MOST_TICKS_UP, EVEN = 8, 12, 40
 powers of ten."""
 
 SMALL_MAPS = 6
-"""Number of maps from which on they are small, three beside each other, and write common labels once."""
+"""Number of maps from which on they are small, three side by side, and write common labels once."""
 
 
 def picture(bank: Bank) -> Figure:
@@ -117,7 +117,7 @@ def _all_named(chart: Chart) -> bool:
 
 
 def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None:
-    """Charts with the same axis beside or above one another name it once."""
+    """Charts with the same axis next to or above one another name it once."""
     for j, (axes, chart) in enumerate(zip(grid, charts, strict=True)):
         below = charts[j + columns] if j + columns < len(charts) else None
         # scales that are equal along both axes make boxes of unlike sizes

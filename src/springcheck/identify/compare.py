@@ -26,7 +26,7 @@ SINGLE = 2.0**-24
 
 @dataclass(frozen=True, kw_only=True)
 class Freedom:
-    """What a comparison leaves open beside a row's own numbers."""
+    """What a comparison leaves open next to a row's own numbers."""
 
     jitter: float = 0.0
     """Relative uncertainty of the interval, by which velocities scale."""
@@ -39,7 +39,7 @@ class Freedom:
     growing: bool = False
     """Whether friction may be negative."""
     bias: float = 0.0
-    """Standard error of the entries beside that of the fit."""
+    """Standard error of the entries next to that of the fit."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -281,7 +281,7 @@ def _of_the_law(candidates: tuple[Candidate, ...]) -> tuple[str, ...]:
 
 
 def _held(x: Joint) -> str:
-    """Words for a held force, with its number of substeps; "" where it is held over a whole step."""
+    """Words for a constant force, with its number of substeps; "" where it is constant over a whole step."""
     share, error = x.parts[0].g, 12 * x.parts[0].g_error + 1e-9
     off = abs(2 * share - 1)
     if off < max(error, 1 / 64):

@@ -57,7 +57,7 @@ WEAK = "damped elsewhere"
 """The group of two free numbers and many stages that fits some map on some spring by chance."""
 
 STAND_TOGETHER = 4
-"""Rounds whose hypotheses stand beside each other in files of few digits."""
+"""Rounds whose hypotheses stand side by side in files of few digits."""
 
 OF_DOUBLE = tuple(ROUNDS[i] for i in (0, 2, 3, 4, 1, *range(5, len(ROUNDS))))
 """The same for double precision, where a row that leaves friction open needs more than one that does not."""

@@ -18,7 +18,7 @@ from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.term import Column, Origin, Term, WithoutPotential
 
 CLOCK = 2.0**-500
-"""Mass of the clock [M], equal to its momentum for a unit velocity; its energy is negligible beside that of
+"""Mass of the clock [M], equal to its momentum for a unit velocity; its energy is negligible next to that of
 any motion."""
 
 

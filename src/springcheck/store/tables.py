@@ -36,7 +36,7 @@ class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
     Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one), `auxiliary` those beside the signal, `log` those of signal and axes
+    draws ("." for an axis without one), `auxiliary` those next to the signal, `log` those of signal and axes
     that want a logarithmic scale.
     """
 
@@ -151,7 +151,7 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     kept = {name: kind for name, kind in _VERDICT.items() if name in _OWN or name in table.columns}
     columns = [_column(table, name, kind).tolist() for name, kind in kept.items()]
     if len(columns[0]) > MOST_VERDICTS:
-        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than any of ours")
+        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than springcheck writes")
     back = {number: passed for passed, number in _PASSED.items()}
     found = []
     try:

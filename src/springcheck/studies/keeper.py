@@ -165,7 +165,7 @@ def study(
     *options: str, scene: Scene | None = None, **how: Unpack[How],
 ) -> R:  # fmt: skip
     """Run the study `measure` of these methods and save it in a store (see `kept`); `options` is all that
-    determines its numbers besides the scene."""
+    determines its numbers apart from the scene."""
     more = options if scene is None else (scene.digest, *options)
     with kept(path, command(name, labels, *more), **how) as keeper:
         found = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)

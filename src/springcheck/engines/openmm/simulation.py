@@ -58,7 +58,7 @@ SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-s
 
 
 FAST_STEPS = {"mts": 8}
-"""Evaluations of the fast springs in a step, beside one of the others, by method."""
+"""Evaluations of the fast springs in a step, next to one of the others, by method."""
 
 CUSTOM_STAGES = {
     "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),
@@ -134,7 +134,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
 
 
 def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
-    """A term as its energy in a coordinate x, y or z of a particle, or in the length r of a bond."""
+    """The energy of a term as an expression in x, y or z of a particle, or in the length r of a bond."""
     energy, names = CUSTOM_TERMS[term.key]
     if term.bodies == 2 and scene.places is not None:
         raise MethodError(

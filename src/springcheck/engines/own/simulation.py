@@ -56,7 +56,7 @@ class Own:
 
     @property
     def force_calls(self) -> int:
-        """The forces of all steps so far."""
+        """Number of force evaluations so far."""
         return self._steps and self._first + (self._steps - 1) * self._each
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
@@ -130,7 +130,7 @@ def prepare(
 
 
 def _lacks(plan: Program, scene: Scene) -> bool:
-    """Whether the loops cannot solve for a term, or beside one that depends on the time would sum forces or
+    """Whether the loops cannot solve for a term, or next to one that depends on the time would sum forces or
     compute them in another way than NumPy."""
     keys = {term.key for term in scene.terms}
     if plan.implicit_step:

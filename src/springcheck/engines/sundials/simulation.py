@@ -76,7 +76,7 @@ LARGE = 32
 
 MOST_ALIKE = 1e3
 """Ratio of stiffnesses up to which they may be summed in one matrix: three digits are lost then.  A soft
-spring beside a stiff one would lose more, and is evaluated spring by spring."""
+spring next to a stiff one would lose more, and is evaluated spring by spring."""
 
 
 def _suits_matrix(scene: Scene) -> bool:

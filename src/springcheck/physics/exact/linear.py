@@ -54,7 +54,7 @@ class LinearMotion(ClosedForm):
 
         In a uniform chain these are of the transform, an orthogonal one: some log2(n) roundings of the norm
         of its argument (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three times that where
-        n + 1 has large factors (Bluestein); the exact motion propagates the error of the start unchanged.
+        n + 1 has large factors (Bluestein); the exact solution propagates the error of the start unchanged.
         """
         system, found = self.system, self.modes
         reach, speed, phase, hold = reaches(found, t)

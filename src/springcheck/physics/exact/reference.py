@@ -312,7 +312,7 @@ class ReferenceMotion(ClosedForm):
 
     @np.errstate(all="ignore")
     def _reach(self, sign: int, end: Any) -> None:
-        """Integrate up to a time in units of the step, and compare."""
+        """Integrate up to a time in steps, at two tolerances, and compare."""
         if sign not in self.paths:
             unit = sign * self.system.scene.step
             again = (Path(self.system, unit, FEWER_STAGES, seed, self.n) for seed in SEEDS)

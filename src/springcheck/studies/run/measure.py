@@ -70,7 +70,7 @@ def _holds_runs(path: Path) -> bool:
 
 
 def stored(path: Path) -> Stored:
-    """Data of a run that are stored beside its trajectories."""
+    """Data of a run that are stored next to its trajectories."""
     # an unfinished run has trajectories in its journal, and no file yet
     if not path.is_file():
         return Stored(path=path, verdicts=(), comparison=None)

@@ -104,7 +104,7 @@ def of_runs(
 
 
 def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
-    """Configurational and kinetic temperature of each method beside the exact ones of its scheme."""
+    """Configurational and kinetic temperature of each method next to the exact ones of its scheme."""
     found = [one for one in heated[::-1] if np.isfinite(one.kinetic)]
     if not found:
         return []
