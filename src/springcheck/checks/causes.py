@@ -50,7 +50,7 @@ REMOVED_ROUNDINGS = 16
 """Roundings of each particle's momentum up to which a total momentum is 0."""
 
 FEWEST_ORDERS = 1e9
-"""Ways to choose the steps that are off, of which one has the farthest by chance."""
+"""Ways to choose the steps that are wrong, of which one has the farthest by chance."""
 
 DECLARE_DIFFERENCES = "judge it with --differences (in Python: rebuilds_velocity=True)"
 """What to do where velocities are right to what differences of positions keep."""

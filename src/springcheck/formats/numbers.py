@@ -30,9 +30,8 @@ def states_of(
 ) -> States:  # fmt: skip
     """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
 
-    From MATLAB and Octave times may be (1, f) or (f, 1), and columns may stand in rows.  `names` select among
-    the arrays, and give the quantity of one whose name does not: ``t=clock,q=x,v=dx``; of a single array they
-    name the columns.
+    MATLAB and Octave write times as (1, f) or (f, 1), and may write columns as rows.  `names` select arrays
+    and state their quantities, as ``t=clock,q=x,v=dx``; for a single array they name the columns.
     """
     given = arrays
     first, *more = arrays.values() or [np.empty(0)]
@@ -77,7 +76,7 @@ def states_of(
 
 
 def _state_vector(arrays: Mapping[str, Any], step: float | None) -> tuple[Mapping[str, Any], float | None]:
-    """Arrays of which one holds positions and then velocities as q and v, and the time between frames."""
+    """Arrays with one state vector split into q and v, and the time between frames."""
     plain_ = {
         name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"
     }

@@ -184,7 +184,7 @@ class Journal:
         return Draft(self._part("run", label), label, scene, sequence=self._sequence, run=self.run)
 
     def save(self, trajectory: Trajectory, scene: Scene) -> str:
-        """Store a trajectory that is at hand in full -> digest."""
+        """Store a complete trajectory; returns its digest."""
         with self.draft(trajectory.label, scene) as draft:
             draft.append(*(getattr(trajectory, x) for x in ("t", *layout.QUANTITIES)))
             return draft.finish(records.attributes(trajectory))

@@ -150,7 +150,7 @@ def source_of(path: Path, label: str) -> Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
-    """What is in a store.  `complete` is False while a journal of another run stands beside it; size [B]."""
+    """What is in a store.  `complete` is False while a journal of another run stands next to it; size [B]."""
 
     path: Path
     size: int

@@ -21,6 +21,8 @@ _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""
 DEEPEST = 8
 """Groups that a table lies in."""
+MOST_VERDICTS = 1 << 17
+"""Most verdicts in a table: every check of the most trajectories that a store may hold."""
 _PASSED = {None: -1, False: 0, True: 1}
 _VERDICT = {
     "method": "O", "check": "O", "value": "f", "bound": "f", "unit": "O", "passed": "i", "why": "O",
@@ -35,7 +37,7 @@ class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
     Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one), `auxiliary` those beside the signal, `log` those of signal and axes
+    draws ("." for an axis without one), `auxiliary` those next to the signal, `log` those of signal and axes
     that want a logarithmic scale.
     """
 
@@ -139,6 +141,8 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     """The verdicts of such a table.  StoreError where it is none."""
     kept = {name: kind for name, kind in _VERDICT.items() if name in _OWN or name in table.columns}
     columns = [_column(table, name, kind).tolist() for name, kind in kept.items()]
+    if len(columns[0]) > MOST_VERDICTS:
+        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than springcheck writes")
     back = {number: passed for passed, number in _PASSED.items()}
     found = []
     try:
