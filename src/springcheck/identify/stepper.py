@@ -11,6 +11,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.catalogue import FAULTS, of_scheme, title
+from springcheck.identify.elsewhere import ELSEWHERE
 from springcheck.identify.pair import Timeless, on_a_pair, returned
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
@@ -22,7 +23,6 @@ from springcheck.physics.exact import true_motion
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.schemes import SCHEMES
-from springcheck.schemes.elsewhere import ELSEWHERE
 
 Stepper: TypeAlias = Callable[..., Any]
 
