@@ -271,7 +271,7 @@ def fastest(case: Case) -> float:
 
 @check("arith", family="motion", requires=MAP | {"resolved"})
 def arithmetic(case: Case) -> Finding | str:
-    """The size of the step defect is that of the arithmetic the method says it has."""
+    """The size of the step defect is that of the stated arithmetic."""
     named = case.trajectory.arithmetic
     plain = Arithmetic()
     if named.is_double and named.force <= plain.force and not named.quantum:
