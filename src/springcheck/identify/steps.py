@@ -32,6 +32,10 @@ STEPS, MOST_STEPS = 24, 100
 """Recorded frames that are compared, and most steps from one to the next."""
 
 
+FIRST = 3
+"""Frames by which most schemes are excluded before the others are compared."""
+
+
 def _mistake(text: str, **step: Any) -> Scheme:
     return Scheme(name=text, title=text, order=0, limit=0.0, symplectic=False, **step)
 
@@ -67,6 +71,8 @@ def takers(
     size = [np.max(np.abs(x), axis=1, keepdims=True) for x in end]
     found = []
     for name in names:
+        if len(q) > FIRST and not takers([name], scene, h, q[:FIRST], p[:FIRST], least, every=every):
+            continue
         whole, half = (Law(scheme=WRONG.get(name) or scheme(name), scene=scene, h=h / n) for n in (1, 2))
         once = twice = start
         with np.errstate(all="ignore"):
@@ -153,19 +159,6 @@ def _unit(x: Floats, steps: Integers, roundoff: float, least: float) -> Floats:
     coarse = form.name in BINARY or np.max(unit) >= 2.0**-24 * np.max(np.abs(x))
     own = 2.0 ** -BINARY.get(form.name, BINARY["single"]) if coarse else 2.0**-53
     return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
-
-
-def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
-    """One sentence on the schemes of the catalogue that take the recorded steps around a frame; "" where none
-    does, and where frames are more than `MOST_STEPS` apart."""
-    first = max(0, min(about - STEPS // 2, len(run.t) - STEPS))
-    found = _taking(scene, run, slice(first, first + STEPS + 1))
-    # that steps which failed are nearly the scheme's own is no cause
-    titles = [title(name) for name in found if run.scheme not in found]
-    if titles and titles[0] in WRONG:
-        return titles[0]
-    what = "step recorded there is that" if run.every == 1 else f"frame there follows by {run.every} steps"
-    return f"Every {what} of {either(titles)}" if titles else ""
 
 
 def _taking(scene: Scene, run: Trajectory, frames: slice, least: float = 2.0**-49) -> tuple[str, ...]:
