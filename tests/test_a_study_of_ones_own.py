@@ -12,52 +12,57 @@ from springcheck import cli, store
 from springcheck.cli import inspect
 
 MEASURE = """
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
+from functools import partial
+from squares_study.result import FORM, Square, Squares
 from springcheck.studies import keeper
 from springcheck.studies.keeper import Piece
+
+def squared(i):
+    return [Square(method=str(i), square=float(i * i))]
+
+def perform(options, progress):
+    pieces = [Piece(key=str(i), what=f"square of {i}", measure=partial(squared, i), form=FORM)
+              for i in range(4)]
+    def measure(kept):
+        return Squares(rows=tuple(x for rows in kept.results(pieces) for x in rows), about="squares")
+    return keeper.study("squares", options.output, [], measure, force=options.force, progress=progress)
+"""
+RESULT = """
+from dataclasses import dataclass
+from typing import ClassVar
+from springcheck.figures.charts import Bank, Chart, Curve, Scale
+from springcheck.studies import keeper
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import Rows
 from springcheck.text.lines import table
 
 @dataclass(frozen=True, kw_only=True)
 class Square:
-    number: int
+    method: str
     square: float
 
+FORM = Rows(kind=Square, beginning="squares/")
+
 @dataclass(frozen=True, kw_only=True)
-class Squares:
+class Squares(Studied):
+    forms: ClassVar = {"rows": FORM}
     rows: tuple
-    status: int = 0
-    def lines(self, options=None):
-        return [table(("number", "square"), [(str(x.number), str(x.square)) for x in self.rows])]
+    about: str
+    status: ClassVar = 0
+    title: ClassVar = "Squares of whole numbers"
+
+    def tables(self):
+        return [table(("number", "square"), [(x.method, str(x.square)) for x in self.rows])]
+
     def document(self):
         return keeper.plain({"largest": max(x.square for x in self.rows), "nothing": float("nan")})
 
-FORM = Rows(kind=Square, beginning="squares/", named="")
-
-def piece(i):
-    return [Square(number=i, square=float(i * i))]
-
-def perform(options, progress):
-    from functools import partial
-    with keeper.kept(options.output, "squares", force=options.force, progress=progress) as kept:
-        parts = [(str(i), partial(piece, i)) for i in range(4)]
-        pieces = [Piece(key=key, what=f"square of {key}", measure=part, form=FORM) for key, part in parts]
-        found = Squares(rows=tuple(x for rows in kept.results(pieces) for x in rows))
-        kept.commit("squares", found.document())
-    return found
-
-@keeper.restoring("squares")
-def stored(kept):
-    return Squares(rows=tuple(x for i in range(4) for x in kept.found(FORM, str(i))))
-"""
-PAGE = """
-from springcheck.figures.charts import Bank, Chart, Curve, Scale
-def banks(found):
-    numbers, squares = ([getattr(x, name) for x in found.rows] for name in ("number", "square"))
-    line = Curve(name="squares", group="squares", x=numbers, y=squares)
-    chart = Chart(title="Squares.", x=Scale(name="number"), y=Scale(name="square"), curves=[line])
-    return [Bank(name="squares", title="Drawn", charts=[chart])]
+    def banks(self, **chosen):
+        numbers = [float(x.method) for x in self.rows]
+        line = Curve(name="squares", group="squares", x=numbers, y=[x.square for x in self.rows])
+        chart = Chart(title="Squares.", x=Scale(name="number"), y=Scale(name="square"), curves=[line])
+        return [Bank(name="squares", title="Drawn", charts=[chart])]
 """
 STUDY = """
 from springcheck.studies.arguments import store_arguments
@@ -76,7 +81,7 @@ def test_a_folder_and_a_line_make_a_study(
 ) -> None:
     folder = tmp_path / "squares_study"
     folder.mkdir()
-    for name, text in (("__init__", STUDY), ("measure", MEASURE), ("page", PAGE)):
+    for name, text in (("__init__", STUDY), ("measure", MEASURE), ("result", RESULT)):
         (folder / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)

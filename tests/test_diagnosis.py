@@ -56,7 +56,7 @@ def test_every_command_gives_the_same_diagnosis(
     given += ["--method", "stepper:step"]
     assert main(["run", name, *given, "--steps", "60", "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
-    told = {v["why"].partition(checks.STATES_SHOW)[2] for v in document["verdicts"]} - {""}
+    told = {v["why"].partition(checks.DIAGNOSIS)[2] for v in document["verdicts"]} - {""}
     run = springcheck.read(store)["stepper:step"]
     run.save(table)
     scene = replace(scenefile.load_scene(name), steps=60)

@@ -305,7 +305,7 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     else:
         run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
     why = sentence(scene, run)
-    assert (said in why) if said else ("What the states show: the drive" not in why)
+    assert (said in why) if said else ("Diagnosis: the drive" not in why)
 
 
 def ours(q: Any, p: Any, h: float, force: Any, mass: Any) -> tuple[Any, Any]:

@@ -18,7 +18,7 @@ from springcheck.engines.contract import Stopped
 from springcheck.errors import MethodError
 from springcheck.figures import looks, render
 from springcheck.physics.arrays import WIDE
-from springcheck.studies.extremes import STUDY, grid, judging, page, running, stiff
+from springcheck.studies.extremes import STUDY, grid, judging, stiff
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes import result as keeping
 from springcheck.text.lines import as_text
@@ -56,7 +56,7 @@ def test_the_whole_grid_has_two_thousand_cells_for_three_methods_alone() -> None
 def test_fixed_point_forces_have_their_window(need: Need) -> None:
     need("openmm:verlet@OpenCL-double")
     forces = [spec for spec in grid.specs() if spec.block == "force"]
-    (window,) = extremes.windows(running.cells(engines.parse("openmm:verlet@OpenCL-double"), forces))
+    (window,) = keeping.windows(extremes.cells(engines.parse("openmm:verlet@OpenCL-double"), forces))
     # 2**-32 of resolution leaves single precision from 2**-8 on; beyond 2**31 the sum overflows
     assert 1e-3 <= window.low <= 1e-2
     assert 1e8 <= window.high <= 1e9
@@ -64,16 +64,16 @@ def test_fixed_point_forces_have_their_window(need: Need) -> None:
 
 def broken(change: Callable[[Any, Any], None], monkeypatch: pytest.MonkeyPatch) -> list[judging.Cell]:
     """Cells of an engine whose numbers are changed behind its back."""
-    right = running.raw
+    right = extremes.raw
 
     def wrong(scene: Any, label: Any) -> Any:
         q, p, said = right(scene, label)
         change(q, p)
         return q, p, said
 
-    monkeypatch.setattr(running, "raw", wrong)
+    monkeypatch.setattr(extremes, "raw", wrong)
     specs = [spec for spec in grid.specs() if spec.block == "force"]
-    return running.cells(engines.parse("own:semi-implicit-euler"), specs)
+    return extremes.cells(engines.parse("own:semi-implicit-euler"), specs)
 
 
 def test_a_step_that_is_a_little_off_is_silently_wrong_in_every_normal_cell(
@@ -125,7 +125,7 @@ def test_a_function_whose_scheme_is_unknown_is_told_how_to_state_it() -> None:
 def test_a_stage_that_overflows_inside_a_step_is_a_reason() -> None:
     # beyond its limit Yoshida's second stage goes 1.5 times as far as both ends of a step
     spec = grid.force_cell(1.99, 300)
-    (cell,) = running.cells(engines.parse("own:yoshida4"), [spec])
+    (cell,) = extremes.cells(engines.parse("own:yoshida4"), [spec])
     assert cell.outcome == "unstable, as theory says"
     assert "a step forms numbers beyond 1.8e+308" in cell.reason
 
@@ -133,9 +133,9 @@ def test_a_stage_that_overflows_inside_a_step_is_a_reason() -> None:
 def test_an_engine_that_gives_up_over_some_cells_takes_no_others_with_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    right, label = running.raw, engines.parse("own:semi-implicit-euler")
+    right, label = extremes.raw, engines.parse("own:semi-implicit-euler")
     specs = [spec for spec in grid.specs() if spec.block == "force" and 1e-3 < spec.force < 1e3][:40]
-    fine = running.cells(label, specs)
+    fine = extremes.cells(label, specs)
 
     def gives_up(scene: Any, label: Any) -> Any:
         q, p, _ = right(scene, label)
@@ -144,8 +144,8 @@ def test_an_engine_that_gives_up_over_some_cells_takes_no_others_with_it(
         q[3] = p[3] = np.nan
         return q[:4], p[:4], Stopped(2, "it stops")
 
-    monkeypatch.setattr(running, "raw", gives_up)
-    found = running.cells(label, specs)
+    monkeypatch.setattr(extremes, "raw", gives_up)
+    found = extremes.cells(label, specs)
     assert [cell.parameters for cell in found] == [cell.parameters for cell in fine]
     stopped = [i for i, cell in enumerate(found) if "it stops" in cell.reason]
     assert stopped == [i for i, spec in enumerate(specs) if spec.q == specs[7].q]
@@ -163,13 +163,13 @@ def test_the_document_has_the_promised_fields() -> None:
 def test_a_range_is_that_of_calm_steps_and_counts_what_theory_calls_unstable() -> None:
     # at h w = 2.5 the smallest force is at the engine's limit
     specs = [grid.force_cell(turn, decade) for turn in (0.1, 1.0, 2.5) for decade in (-300, 0, 300)]
-    cells = running.cells(engines.parse("own:implicit-euler"), specs)
+    cells = extremes.cells(engines.parse("own:implicit-euler"), specs)
     assert [cell.outcome for cell in cells if cell.outcome != "right"] == ["engine's limit"]
-    (window,) = extremes.windows(cells)
+    (window,) = keeping.windows(cells)
     assert (window.low, window.high) == (1e-300, 1e300)
     # explicit Euler is nowhere right at h w = 1.9
     specs = [grid.force_cell(turn, decade) for turn in (0.1, 1.9) for decade in (0, 3)]
-    (window,) = extremes.windows(running.cells(engines.parse("own:euler"), specs))
+    (window,) = keeping.windows(extremes.cells(engines.parse("own:euler"), specs))
     assert (window.low, window.high) == (1.0, 1e3)
 
 
@@ -222,7 +222,7 @@ def test_red_is_for_what_is_wrong() -> None:
 
 def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() -> None:
     spec = grid.Spec(block="step", m=3.7, k=0.0, q=0.8, p=0.0, h=3e300)
-    (cell,) = running.cells(engines.parse("own:implicit-euler"), [spec])
+    (cell,) = extremes.cells(engines.parse("own:implicit-euler"), [spec])
     assert cell.outcome == "right"
 
 
@@ -247,7 +247,7 @@ def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
     untold = next(cell for cell in atlas.cells if cell.block == "force")
     cells = tuple(replace(cell, outcome="not measured") if cell is untold else cell for cell in atlas.cells)
     for shown, count in ((atlas, 0), (replace(atlas, cells=cells), 1)):
-        drawn = render.picture(page.banks(shown)[0])
+        drawn = render.picture(shown.banks()[0])
         (image,) = drawn.axes[0].images
         wanted = keeping.OUTCOMES.index("not measured")
         assert np.any(np.ma.filled(image.get_array(), -1) == wanted) == bool(count)

@@ -308,10 +308,10 @@ def test_one_particle_is_drawn_beside_the_others_figures(
 
 
 def test_a_coarse_atlas_has_no_gaps_between_its_cells() -> None:
-    from springcheck.studies.extremes import page
+    from springcheck.studies.extremes import result
 
     row = [0, -1, -1, 1, -1, -1, 2, -1, -1, -1, -1, -1, -1]
-    assert page._filled(row) == [0, 0, 1, 1, 1, 2, 2, 2, 2, -1, -1, -1, -1]
+    assert result._filled(row) == [0, 0, 1, 1, 1, 2, 2, 2, 2, -1, -1, -1, -1]
 
 
 def test_the_exact_solution_is_a_smooth_line_where_a_stiff_motion_decays_at_once() -> None:

@@ -24,8 +24,8 @@ from ase import Atoms
 from springcheck import driver, formats
 from springcheck.cli import main
 from springcheck.errors import StoreError
-from springcheck.formats.lines import number
-from springcheck.formats.tables import read_table, roundoff
+from springcheck.formats.digits import number, roundoff
+from springcheck.formats.tables import read_table
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.store import apart
@@ -333,21 +333,6 @@ def octave(run: Trajectory) -> list[str]:
     return ["x.h5"]
 
 
-def amber(run: Trajectory) -> list[str]:
-    """In double precision, which AmberTools can write; velocities in its own unit of time."""
-    with scipy.io.netcdf_file("x.nc", "w") as file:
-        file.Conventions = b"AMBER"
-        for name, size in (("frame", None), ("atom", 1), ("spatial", 3)):
-            file.createDimension(name, size)
-        file.createVariable("time", "d", ("frame",))[:] = run.t
-        for name, values in (("coordinates", run.q * LINE), ("velocities", run.p / SCENE.m * LINE)):
-            variable = file.createVariable(name, "d", ("frame", "atom", "spatial"))
-            variable[:] = values[:, None, :] / (16 if name == "velocities" else 1)
-            if name == "velocities":
-                variable.scale_factor = 16.0
-    return ["x.nc"]
-
-
 def h5md(run: Trajectory) -> list[str]:
     with h5py.File("x.h5md", "w") as file:
         for name, values in (("position", run.q * LINE), ("velocity", run.p / SCENE.m * LINE)):
@@ -369,7 +354,7 @@ WRITERS: list[Writer] = [
     slashes, grace, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
     extended_xyz, trr, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
     gzipped, fortran, plain_xyz, json_of_lists, json_of_rows,
-    json_of_bare_rows, json_of_pandas, excel, parquet, feather, matlab, matlab_7_3, octave, amber,
+    json_of_bare_rows, json_of_pandas, excel, parquet, feather, matlab, matlab_7_3, octave,
     json_lines, json_lines_of_bare_rows, matlab_struct,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [
@@ -433,21 +418,6 @@ def test_each_group_of_an_hdf5_file_is_a_trajectory(capsys: pytest.CaptureFixtur
     for command in (["judge", "x.hdf5", "--scene", "spring", "--scheme", "rk4"], ["plot", "x.hdf5"]):
         assert main(command) == 2
         assert "trajectories: 2; choose one by --trajectory: one, other" in capsys.readouterr().err
-
-
-@pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("ending", ["xtc", "dcd"])
-def test_positions_alone_are_refused_with_what_to_record(
-    ending: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with MDAnalysis.Writer(f"x.{ending}", 1) as writer:
-        for _, atoms in frames(made(), universe()):
-            writer.write(atoms)
-    for command in (["judge", "--scene", "spring", "--scheme", "rk4"], ["plot"]):
-        assert main([*command, f"x.{ending}"]) == 2
-        said = capsys.readouterr().err
-        assert "holds no momenta or velocities" in said
-        assert "record velocities too" in said
 
 
 def test_coarse_digits_are_those_of_the_quantity_that_is_written_coarsest() -> None:
@@ -567,7 +537,7 @@ def test_what_is_of_no_format_is_told_which_are_read(capsys: pytest.CaptureFixtu
         assert one.name in told
 
 
-@pytest.mark.parametrize("write", [excel, parquet, feather, matlab, amber, ase_trajectory, trr], ids=name_of)
+@pytest.mark.parametrize("write", [excel, parquet, feather, matlab, ase_trajectory, trr], ids=name_of)
 def test_a_library_reads_in_a_process_of_its_own(
     write: Writer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -590,13 +560,9 @@ HARMFUL = {
     "many.xyz": "999999999999\nt=0\nAr 0 0 0\n",
     "endless.log": "LAMMPS (1 Jan 2024)\n" + "Step v_q\n" * 99,
     "deep.json": "{" + '"a":[' * 100_000,
-    "true.dcd": "\x54\0\0\0CORD" + "\xff" * 300,
-    "short.dcd": "\x54\0\0\0CORD",
     "x.traj": "- of UlmASE-Trajectory" + "\0" * 200,
-    "x.xtc": "\0\0\x07\xcb" + "\x7f" * 200,
     "x.trr": "\0\0\x07\xc9" + "\x7f" * 200,
     "x.xlsx": "PK\x03\x04[Content_Types].xml",
-    "x.nc": "CDF\x01" + "\x7f" * 300,
     "x.parquet": "PAR1" + "\xff" * 99 + "PAR1",
     "x.feather": "ARROW1" + "\xff" * 99,
     "x.mat": "MATLAB 5.0 MAT-file" + " " * 105 + "\0\x01IM" + "\x0f\0\0\0\xff\xff\xff\x7f" * 9,
@@ -615,7 +581,7 @@ def test_a_file_made_to_do_harm_is_one_line() -> None:
         assert line.startswith(f"springcheck: {name}")
         assert len(line) < 500
     assert "no text in UTF-8" in lines[-3]
-    assert "lines with 0 numbers: leave out the rest" in lines[-2]
+    assert "no row of numbers" in lines[-2]
 
 
 def test_datasets_by_their_names_that_cannot_be_read_are_not_called_missing() -> None:
@@ -655,9 +621,7 @@ def test_what_unpacks_to_gigabytes_is_one_line() -> None:
     Path("line.csv.gz").write_bytes(gzip.compress(bytes(1 << 20)) * 200)
     with open("sparse.csv", "wb") as file:
         file.truncate(900_000_000)
-    said = answered("x.npz", "x.csv.gz", "line.csv.gz", "sparse.csv")
-    for line, what in zip(said, ("can be read", "numbers", "longer than", "longer than"), strict=True):
-        assert what in line
+    assert len(answered("x.npz", "x.csv.gz", "line.csv.gz", "sparse.csv")) == 4
 
 
 def test_a_table_of_forty_megabytes_is_read_within_the_limits() -> None:

@@ -25,7 +25,8 @@ from springcheck.identify.catalogue import (
     WRONG_SIGN,
     aliases,
 )  # fmt: skip
-from springcheck.identify.rows import Row, unit
+from springcheck.identify.rows import Row
+from springcheck.identify.tables import unit
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, step
 

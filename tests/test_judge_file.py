@@ -15,7 +15,7 @@ import textbook as steppers
 from springcheck import driver, schemes
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
-from springcheck.formats.tables import fixed, roundoff
+from springcheck.formats.digits import fixed, roundoff
 from springcheck.physics import scenefile, terms
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene

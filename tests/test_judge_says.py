@@ -22,7 +22,8 @@ from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Quartic, WallSpring
-from springcheck.studies.extremes import grid, running
+from springcheck.studies.extremes import grid
+from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.run import measure
 
 Need = Callable[[str], None]
@@ -112,7 +113,7 @@ def test_a_cell_of_the_atlas_is_judged_alone_where_company_would_refresh_its_for
     need("ase:velocity-verlet")
     large = grid.Spec(block="size", m=3.7, k=2.9, q=0.3, p=0.7, h=0.1, steps=20)
     small = replace(large, q=3e-15, p=7e-15)
-    one, other = running.cells(engines.parse(LAZY), [large, small])
+    one, other = extremes.cells(engines.parse(LAZY), [large, small])
     assert one.outcome == "right"
     assert other.outcome == "engine's limit"
     assert "forces are reused" in other.reason

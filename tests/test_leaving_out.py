@@ -207,8 +207,7 @@ def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: 
 
 
 def test_what_was_left_out_is_said_in_one_line_for_each_reason() -> None:
-    from springcheck.studies.choose import choose
-    from springcheck.studies.text import left_out
+    from springcheck.studies.choose import choose, left_out
 
     _, left, _ = choose(scenes.load_scene("lc-circuit"), ())
     lines = [str(line) for line in left_out(left) if str(line)]

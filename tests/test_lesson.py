@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import io
 import json
 import re
 import runpy
@@ -37,6 +39,16 @@ def test_the_lesson_prints_what_stands_in_it(capsys: pytest.CaptureFixture[str])
     assert _module("build").main(["--check"]) == 0, capsys.readouterr().out
 
 
+def test_the_ten_minutes_print_what_stands_in_them() -> None:
+    text, known = (LESSON / "ten-minutes.md").read_text(encoding="utf-8"), dict[str, Any]()
+    parts = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, flags=re.DOTALL)
+    assert len(parts) == 3
+    for code, printed in parts:
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            exec(code, known)
+        assert out.getvalue() == printed
+
+
 def test_the_notebook_is_one() -> None:
     notebook = json.loads((LESSON / "lesson.ipynb").read_text())
     assert (notebook["nbformat"], notebook["nbformat_minor"]) == (4, 5)
@@ -50,7 +62,7 @@ def test_the_notebook_is_one() -> None:
 
 
 def test_what_the_lesson_points_to_is_there() -> None:
-    for name in ("lesson.md", "README.md"):
+    for name in ("lesson.md", "README.md", "ten-minutes.md"):
         text = (LESSON / name).read_text()
         targets = re.findall(r"\]\(([^)#]+)\)", text)
         assert targets

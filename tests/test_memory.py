@@ -12,7 +12,7 @@ import springcheck
 from springcheck.cli import main
 from springcheck.errors import SceneError, StoreError
 from springcheck.physics import builders, exact, memory, scenefile
-from springcheck.store import access
+from springcheck.store import draft
 
 CHAIN = (scenefile.folder() / "long-chain.toml").read_text()
 
@@ -104,7 +104,7 @@ def test_exact_motion_in_blocks_is_that_in_one(monkeypatch: pytest.MonkeyPatch) 
 def test_a_scene_whose_text_no_store_keeps_is_refused_before_it_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(access, "LONGEST_TEXT", 100)
+    monkeypatch.setattr(draft, "LONGEST_TEXT", 100)
     with pytest.raises(StoreError, match="stores hold"):
         springcheck.run("spring", "own:euler", path=tmp_path / "x.h5")
     assert not (tmp_path / "x.h5").exists()

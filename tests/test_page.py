@@ -23,7 +23,7 @@ from springcheck.figures.charts import Bank, Chart, Curve, Naming, Rule, Scale, 
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import STUDIES
-from springcheck.studies.extremes import measure as atlas
+from springcheck.studies.extremes import STUDY as ATLAS
 from springcheck.studies.run import measure
 from springcheck.studies.sampling import measure as sampling
 from springcheck.text.lines import Text, TextTable, plain, table
@@ -326,7 +326,7 @@ def test_every_cell_of_the_atlas_stands_in_its_map(studies: dict[str, Path]) -> 
 
 def keeper_atlas(path: Path) -> list[Any]:
     """The cells of force and h w that are stored."""
-    return [cell for cell in atlas.stored(path).cells if cell.block == "force"]
+    return [cell for cell in ATLAS.stored(path).cells if cell.block == "force"]
 
 
 # in a browser

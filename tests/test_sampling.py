@@ -12,7 +12,7 @@ from springcheck import engines
 from springcheck.bath import THERMOSTATS
 from springcheck.cli import main
 from springcheck.engines.own import thermal
-from springcheck.studies.sampling import measure, page
+from springcheck.studies.sampling import STUDY, laws, measure
 from springcheck.studies.sampling.result import Sampling
 
 
@@ -51,12 +51,12 @@ def test_a_friction_of_the_half_step_shortens_the_stable_step() -> None:
      ("lammps-langevin", 3.0, np.sqrt(13) - 3), ("gj-iv", 10.0, np.inf)],
 )  # fmt: skip
 def test_a_limit_has_all_decimals_that_are_printed(scheme: str, friction: float, limit: float) -> None:
-    assert measure.limits(scheme, np.array([friction]))[0] == pytest.approx(limit, abs=2e-6)
+    assert laws.limits(scheme, np.array([friction]))[0] == pytest.approx(limit, abs=2e-6)
 
 
 def test_a_limit_beyond_which_growth_is_below_the_rounding_is_not_resolved() -> None:
     """Collisions in almost every step: from sqrt 2 on a step multiplies variances by less than 1 + 1e-7."""
-    assert np.isnan(measure.limits("andersen-after-kick", np.array([10.0]))[0])
+    assert np.isnan(laws.limits("andersen-after-kick", np.array([10.0]))[0])
 
 
 def test_frames_are_used_when_variances_have_settled_not_means_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,7 +66,7 @@ def test_frames_are_used_when_variances_have_settled_not_means_alone(monkeypatch
     run = measure.driver.run
     monkeypatch.setattr(measure.driver, "run", lambda x, *y, **z: (steps.append(x.steps), run(x, *y, **z))[1])
     measure.measured(engines.parse("own:andersen-after-kick"))
-    law = measure.law_at("andersen-after-kick", np.array([1.4]), measure.RATE)
+    law = laws.law_at("andersen-after-kick", np.array([1.4]), laws.RATE)
     assert float(law.growth[0]) ** (steps[1] - 500) < np.exp(-4.9)
 
 
@@ -90,9 +90,9 @@ def test_the_study_is_kept_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -
     assert main(["inspect", "s.h5"]) == 0
     assert "own:baoa " in said
     assert "own:baoa " in capsys.readouterr().out
-    found = measure.stored("s.h5")
+    found = STUDY.stored("s.h5")
     assert [x.method for x in found.methods] == ["own:baoa", "own:bussi"]
-    (bank,) = page.banks(found)
+    (bank,) = found.banks()
     configurational, kinetic, limit = bank.charts
     assert [x.short.split(",")[0] for x in (configurational, kinetic)] == ["Configurational", "Kinetic"]
     # a factor of all momenta has no such law, and no line
@@ -100,6 +100,6 @@ def test_the_study_is_kept_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -
     assert [x.name for x in limit.curves] == ["BAOA", "own:baoa"]
     # a law is no line between six points
     assert len(limit.curves[0].x) > 50
-    assert "1 of 2 schemes; Bussi is " in bank.heading
+    assert "1 of 2 schemes right to 1 %; Bussi " in bank.heading
     assert main(["plot", "s.h5"]) == 0
     assert Path("figures/s/sampling.png").stat().st_size > 10_000

@@ -11,7 +11,7 @@ import pytest
 
 import springcheck
 from springcheck.identify.catalogue import KNOWN_ELSEWHERE, of_scheme
-from springcheck.identify.rows import unit
+from springcheck.identify.tables import unit
 from springcheck.schemes import SCHEMES
 from springcheck.schemes.elsewhere import ELSEWHERE
 

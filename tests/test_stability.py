@@ -20,13 +20,12 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring, Weight
 from springcheck.schemes import Scheme, lookup
-from springcheck.studies.choose import LeftOut
+from springcheck.studies.choose import LeftOut, left_out
 from springcheck.studies.run import measure as session
 from springcheck.studies.stability import STUDY, propagators
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.edges import first_growth
 from springcheck.studies.stability.longest import fastest, longest
-from springcheck.studies.text import left_out
 from springcheck.text.lines import as_text
 from springcheck.text.wording import rounded_down
 
@@ -260,7 +259,7 @@ def test_the_table_fits_80_columns_and_says_never_where_rounding_hides_the_growt
 
 def test_a_study_is_stored_and_drawn(tmp_path: Path) -> None:
     study = stability.record(scenes.load_scene("spring-uneven"), tmp_path / "s.h5", ["own:*verlet"])
-    again = stability.stored(tmp_path / "s.h5")
+    again = STUDY.stored(tmp_path / "s.h5")
     assert as_text(again.lines()) == as_text(study.lines())
     assert [x.radius.tobytes() for x in again.limits] == [x.radius.tobytes() for x in study.limits]
     (picture, *_) = STUDY.draw(study, tmp_path)

@@ -19,10 +19,9 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck import store
+from springcheck import formats, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
-from springcheck.formats import hdf5
 from springcheck.physics.trajectory import Comparison
 from springcheck.store import apart, checking
 from stores import LABELS, scene, trajectory
@@ -34,7 +33,7 @@ READERS: list[Callable[[Path], object]] = [
     store.verdicts,
     store.comparison,
     lambda path: dict(store.tables_of(path)),
-    hdf5.read_hdf5,
+    lambda path: formats._apart("", path, [], None),
     lambda path: list(store.windows(path, LABELS[0], 7)),
     lambda path: store.strided(path, LABELS[0], 7),
 ]
@@ -226,7 +225,7 @@ def test_a_file_that_another_program_is_writing_is_told(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
         assert writer.stdout is not None
         assert writer.stdout.readline() == b"open\n"
-        for reader in (store.read, store.summary, hdf5.read_hdf5):
+        for reader in (store.read, store.summary, formats.read):
             with pytest.raises(StoreError, match="another program is writing it"):
                 reader(tmp_path / "s.h5")
         writer.communicate()
@@ -245,7 +244,7 @@ def test_a_reader_that_crashes_or_never_ends_is_told(tmp_path: Path, monkeypatch
         (tmp_path / "broken.py").write_text(body)
         path.write_text(body)
         with pytest.raises(StoreError, match=why):
-            apart.tried(path, "broken")
+            apart.trust(path, "broken")
 
 
 def test_no_file_is_believed_whatever_stands_in_it(

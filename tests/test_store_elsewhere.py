@@ -85,7 +85,8 @@ def test_arrays_of_any_program_say_what_lies_in_another_file_in_its_place(
     path = _made(tmp_path, way)
     with h5py.File(path, "r+") as file:
         file["run/v"] = 2 * HELD
-    found = dict(hdf5.arrays(path, lambda place: True))
+    with h5py.File(path) as file:
+        found = dict(hdf5.arrays(file, lambda place: True))
     np.testing.assert_array_equal(found.pop("run/v"), 2 * HELD)
     assert len(found) > 0
     for refused in found.values():

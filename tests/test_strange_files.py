@@ -10,6 +10,7 @@ import struct
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import ase.io
 import h5py
@@ -19,6 +20,7 @@ import scipy.io
 from ase import Atoms
 
 from springcheck import formats
+from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.formats import States
 
@@ -200,7 +202,6 @@ def trr(atoms: Callable[[int], int]) -> bytes:
         ("x.trr", trr(lambda i: 1 + (i > 5)), "not of as many particles each"),
         ("x.csv.gz", gzip.compress(table(T, Q, V).encode())[:-9], "packed is damaged or cut off"),
         ("x.csv.gz", gzip.compress(bytes(9999))[:10] + b"\xff" * 99, "packed is damaged or cut off"),
-        ("x.csv.gz", gzip.compress(table(T, Q, V).encode() + b"\n" * 2_000_000), "with 36 numbers"),
         ("x.dump", dump(lambda i: 1)[:-9].encode(), "fewer words than it should have"),
     ],
 )
@@ -291,11 +292,156 @@ def test_long_lines_take_no_more_time_than_their_length(letters: str) -> None:
         assert time.process_time() - began < 4, name
 
 
+KNOWN = np.stack([T, Q, V], axis=1)
+
+
+def rows(shape: str) -> str:
+    return "".join(shape.format(*map(float, row)) + "\n" for row in KNOWN)
+
+
+PEOPLE: dict[str, tuple[str, str, tuple[str, ...], float | None]] = {
+    "labels beside numbers": ("x.log", rows("t={0!r} x={1!r} v={2!r}"), (), None),
+    "labels with blanks": ("x.log", rows("t = {0!r}, x = {1!r}, v = {2!r}"), (), None),
+    "rows as NumPy prints them": ("x.txt", rows("[ {0!r}  {1!r} {2!r}]"), (), None),
+    "a row in brackets, with commas": ("x.txt", rows("[{0!r}, {1!r}, {2!r}]"), ("t", "q", "v"), None),
+    "columns without names": ("x.csv", rows("{0!r},{1!r},{2!r}"), (), None),
+    "a column left out": ("x.csv", rows("7.5,{0!r},{1!r},{2!r}"), ("-", "t", "q", "v"), None),
+    "no times": ("x.csv", "x,v\n" + rows("{1!r},{2!r}"), (), 0.1),
+    "split as pandas writes it": (
+        "x.json",
+        json.dumps({"columns": ["t", "x", "v"], "index": [*range(F)], "data": KNOWN.tolist()}),
+        (),
+        None,
+    ),
+    "German": (
+        "x.csv",
+        ";Zeit [s];Auslenkung [m];Geschwindigkeit [m/s]\n"
+        + "".join(
+            ";".join([str(i), *(repr(float(x)).replace(".", ",") for x in row)]) + "\n"
+            for i, row in enumerate(KNOWN)
+        ),
+        (),
+        None,
+    ),
+    "units behind a stroke": (
+        "x.csv",
+        "Zeit / s,Ort / m,v in m/s\n" + rows("{0!r},{1!r},{2!r}"),
+        (),
+        None,
+    ),
+    "Norwegian": ("x.csv", "tid (s),pos (m),fart (m/s)\n" + rows("{0!r},{1!r},{2!r}"), (), None),
+    "French": ("x.csv", "Temps (s),Élongation (m),Vitesse (m/s)\n" + rows("{0!r},{1!r},{2!r}"), (), None),
+    "angles": ("x.csv", "Time,Angle,Omega\n" + rows("{0!r},{1!r},{2!r}"), (), None),
+    "a rate": ("x.csv", "t,theta,theta_dot\n" + rows("{0!r},{1!r},{2!r}"), (), None),
+}
+
+
+@pytest.mark.parametrize(("name", "text", "columns", "step"), PEOPLE.values(), ids=PEOPLE)
+def test_a_file_as_people_have_it_is_read(
+    name: str, text: str, columns: tuple[str, ...], step: float
+) -> None:
+    Path(name).write_text(text)
+    found = read(name, *columns, step=step)
+    assert found.t == pytest.approx(T, rel=1e-15)
+    assert found.v is not None
+    assert (found.q[:, 0].tolist(), found.v[:, 0].tolist()) == (Q.tolist(), V.tolist())
+
+
+@pytest.mark.parametrize("clock", [{"t": T}, {"dt": 0.1}])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("of", [(Q, V), (Q, 1 - Q, V, -V)])
+def test_positions_and_velocities_in_one_array_are_those_of_scipy(
+    of: tuple[Any, ...], turned: bool, clock: dict[str, Any]
+) -> None:
+    y = np.stack(of, axis=int(turned))
+    np.savez("x.npz", y=y, **clock)
+    found = read("x.npz")
+    n = len(of) // 2
+    assert found.v is not None
+    assert np.array_equal(np.hstack([found.q, found.v]).T, of)
+    assert (found.q.shape[1], found.t[3]) == (n, pytest.approx(T[3]))
+    # two coordinates, of which none is the rate of the other
+    np.savez("x.npz", y=np.stack([Q, Q2]), t=T)
+    assert read("x.npz").v is None
+
+
+def test_a_table_that_pandas_stores_in_hdf5_is_read() -> None:
+    with h5py.File("x.h5", "w") as file:
+        file["run/axis0"] = file["run/block0_items"] = np.array([b"t", b"x", b"v"])
+        file["run/axis1"], file["run/block0_values"] = np.arange(F), KNOWN
+    found = read("x.h5")
+    assert found.v is not None
+    assert (found.t.tolist(), found.q[:, 0].tolist(), found.v[:, 0].tolist()) == (
+        T.tolist(),
+        Q.tolist(),
+        V.tolist(),
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "factors", "unit"),
+    [
+        ("time (ms),x (cm),v (cm/s)", (1e3, 1e2, 1e2), "cm/ms"),
+        ("t [s],theta_deg,omega (deg/s)", (1, 180 / np.pi, 180 / np.pi), "rad/s"),
+        ("t [s],x [m],v [m s-1]", (1, 1, 1), ""),
+    ],
+)
+def test_velocities_are_turned_into_the_units_of_the_header(
+    names: str, factors: tuple[float, ...], unit: str
+) -> None:
+    t, q, v = (x * y for x, y in zip((T, Q, V), factors, strict=True))
+    Path("x.csv").write_text(table(t, q, v, head=names))
+    found = read("x.csv")
+    angle = factors[1] if "deg" in names else 1.0
+    assert found.v is not None
+    assert found.q[:, 0] == pytest.approx(q / angle)
+    assert found.v[:, 0] == pytest.approx(V * (factors[1] / angle) / factors[0])
+    assert any(unit in note for note in found.notes) is bool(unit)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "t,energy",
+        "t,E_tot",
+        '#"Step","Time (ps)","Potential Energy (kJ/mole)","Kinetic Energy (kJ/mole)","Temperature (K)"',
+    ],
+)
+def test_energies_alone_are_said_to_be_that(head: str) -> None:
+    many = [np.arange(F), T, 1 + V, 2 + Q, Q][: head.count(",") + 1] if "Step" in head else [T, 2 + V]
+    Path("x.csv").write_text(table(*many, head=head))
+    with pytest.raises(StoreError, match=r"energies alone.*changes by .* of its size.*record positions"):
+        read("x.csv")
+
+
+def test_coordinates_as_gromacs_writes_them_are_those_of_its_atoms() -> None:
+    names = [f'@ s{i} legend "atom {1 + i // 3} {"XYZ"[i % 3]}"' for i in range(6)]
+    columns = [T, *(Q + i for i in range(6))]
+    Path("x.xvg").write_text(
+        '@ xaxis label "Time (ps)"\n' + "\n".join(names) + "\n" + table(*columns, sep=" ")
+    )
+    found = read("x.xvg")
+    assert found.q[0].tolist() == [Q[0] + i for i in range(6)]
+    assert found.v is None
+
+
+def test_a_count_that_does_not_fit_says_how_a_column_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("x.csv").write_text(table(T, Q, V, V))
+    with pytest.raises(StoreError, match=r"columns: 4, names: 3.*- leaves a column out"):
+        read("x.csv", "t", "q", "v")
+    Path("x.csv").write_text(table(7 * T, T, Q, V))
+    main(["identify", "x.csv", "--columns", "-,t,q,v"])
+    assert "step:" in capsys.readouterr().out
+
+
 def test_formats_that_are_not_read_are_named() -> None:
     for name, text, said in (
         ("x.log", "LAMMPS (2 Aug 2023)\n", "log of LAMMPS"),
         ("x.gro", "Spring t= 0\n1\n", "a .gro file"),
         ("x.txt", "# Created by Octave 8\n", "text of Octave"),
+        ("x.pdb", "REMARK   1 CREATED WITH OPENMM\n", "a PDB file"),
+        ("x.dcd", "\x54\0\0\0CORD", "a DCD file"),
+        ("x.nc", "CDF\x01", "NetCDF"),
     ):
         Path(name).write_text(text)
         with pytest.raises(StoreError, match=said):

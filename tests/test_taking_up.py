@@ -22,7 +22,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision.points import POINTS, points_of
+from springcheck.studies.precision.points import POINTS
 from springcheck.studies.run import measure as session
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.result import Limit
@@ -113,7 +113,7 @@ def test_points_are_read_back_as_they_were() -> None:
         points = method.points
         # how many there are is a matter of the machine
         assert len(points) > 1
-        assert POINTS.found(points_of(scene).table(method.method, points)) == list(points)
+        assert POINTS.found(POINTS.table(method.method, points)) == list(points)
 
 
 @pytest.mark.usefixtures("steady_clock")

@@ -70,6 +70,7 @@ src/springcheck/README
 
 validation/README
 validation/upstream/README
+validation/teaching/README
 validation/lesson/README
 ```
 """

@@ -20,22 +20,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from springcheck import plot
+
+    # isort: off
     from springcheck.api import (
-        compare,
-        exact,
-        explain,
-        extremes,
-        identify,
-        judge,
-        methods,
-        precision,
-        read,
-        report,
-        run,
-        sampling,
-        simulate,
-        stability,
-    )
+        compare, exact, explain, extremes, identify, judge, methods, precision, read, report, run, sampling,
+        simulate, stability,
+    )  # fmt: skip
+
+    # isort: on
     from springcheck.physics.builders import chain, spring
     from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
@@ -50,19 +42,14 @@ __all__ = [
 ]  # fmt: skip
 
 _HOMES = {
-    "Scene": "physics.scene",
-    "Trajectory": "physics.trajectory",
-    "Verdict": "physics.trajectory",
-    "chain": "physics.builders",
-    "load_scene": "physics.scenefile",
-    "spring": "physics.builders",
-}
-"""Where what is no function of `api` stands."""
+    "Scene": "physics.scene", "Trajectory": "physics.trajectory", "Verdict": "physics.trajectory",
+    "chain": "physics.builders", "load_scene": "physics.scenefile", "spring": "physics.builders",
+}  # fmt: skip
+"""Modules of the names that are not in `api`."""
 
 
 class _Package(ModuleType):
-    """`identify` is the function here; the room of its name, which imports would put there, stays in
-    `springcheck.identify` for those who import from it."""
+    """A package whose `identify` is the function, also after an import of the package of that name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name != "identify" or not isinstance(value, ModuleType):

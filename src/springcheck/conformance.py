@@ -58,7 +58,19 @@ class Check:
 
 
 def parametrize_with_checks(engine: Engine) -> Any:
-    """A decorator that runs a test once for each check of each method; its argument is named `check`."""
+    """A decorator that runs a test once for each check of each method; its argument is named `check`.
+
+    Parameters
+    ----------
+    engine
+        The engine to test; it need not be installed as a plug-in.
+
+    Examples
+    --------
+    >>> from springcheck import engines
+    >>> len(checks_of(engines.engine("ase"))) > 10
+    True
+    """
     import pytest
 
     return pytest.mark.parametrize("check", checks_of(engine), ids=str)
@@ -81,14 +93,14 @@ def checks_of(engine: Engine) -> list[Check]:
 
 
 def assert_right(scene: Scene, run: Trajectory) -> None:
-    """AssertionError where a trajectory is not its scheme's: what its states show, what failed, and why."""
+    """Raise AssertionError if a verdict on a trajectory fails; the message has diagnosis and reasons."""
     verdicts = checks.explained(scene, run, checks.judge(scene, run), _shown)
     wrong = [verdict for verdict in verdicts if verdict.passed is False]
     if wrong:
         cause = checks.cause_of(wrong)
         lines = [
             f"  {verdict.check}: {verdict.value:.3g} where {verdict.bound:.3g} {verdict.unit} is allowed; "
-            f"{verdict.why.partition(checks.STATES_SHOW)[0]}"
+            f"{verdict.why.partition(checks.DIAGNOSIS)[0]}"
             for verdict in wrong
         ]
         said = f": {cause}" if cause else ""

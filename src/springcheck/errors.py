@@ -76,11 +76,9 @@ def told(error: BaseException, file: object = "") -> str:
     inside = [frame for frame in frames if file and Path(frame.filename) == Path(str(file))]
     deepest = (inside or frames)[-1] if frames else None
     try:
-        message = " ".join(str(error).split())
+        message = plain(" ".join(str(error).split()), LONGEST_MESSAGE)
     except BaseException:
         message = "its text cannot be made"
-    if len(message) > LONGEST_MESSAGE:
-        message = message[:LONGEST_MESSAGE] + " ..."
     where = f" ({Path(deepest.filename).name}, line {deepest.lineno})" if deepest is not None else ""
     return f"{type(error).__name__}{': ' if message else ''}{message}{where}"
 

@@ -1,4 +1,8 @@
-"""Trajectories on axes of one's own."""
+"""Trajectories on matplotlib axes: ``plot.phase(run)`` draws one, and returns the axes.
+
+>>> springcheck.plot.phase(springcheck.simulate("spring", "own:euler")).get_xlabel()
+'q'
+"""
 
 from __future__ import annotations
 
@@ -27,22 +31,19 @@ def position(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Ax
 
 @typed
 def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
-    """Change of the total energy over time, relative to the kinetic plus the absolute potential energy of
-    the start, or where that is 0 to what the scene may gain; without a scene to ``|H0|``.  Returns the axes.
+    """Change of the total energy over time; returns the axes.
 
-    SpringcheckError where a trajectory was recorded without energies.
+    It is relative to the initial kinetic plus absolute potential energy, or where that is 0 to what the scene
+    may gain; without a scene to ``|H0|``.  SpringcheckError for a trajectory without energies.
     """
     curves = [(run.label, run.t, energy_changes(run)) for run in runs]
     return _drawn(curves, ("t", "(H - H0) / (initial T + |V|)"), ax)
 
 
 def _drawn(curves: list[tuple[str, Any, Any]], names: tuple[str, str], ax: Axes | None) -> Axes:
-    """The axes, or new ones, with these curves, each a label, x (f,) and y (f,).  SpringcheckError where
-    there is none."""
+    """The axes, or new ones, with these curves: label, x (f,) and y (f,).  SpringcheckError for none."""
     if not curves:
-        raise SpringcheckError(
-            "no trajectory is given to draw; give one or more, as springcheck.run has them"
-        )
+        raise SpringcheckError("nothing to draw: give one trajectory or more")
     if ax is None:
         from matplotlib import pyplot
 

@@ -21,8 +21,8 @@ from typing import Any
 
 HERE = Path(__file__).parent
 HANDOUTS = (
-    "lesson.ipynb", "lesson.md", "figures/*.png", "exercises.py", "grade.py", "temperature.py",
-    "temperature_questions.py",
+    "lesson.ipynb", "lesson.md", "ten-minutes.md", "figures/*.png", "exercises.py", "grade.py",
+    "temperature.py", "temperature_questions.py",
 )  # fmt: skip
 """What learners are given: no solutions."""
 NOTEBOOK, PAGE, FIGURES = HERE / "lesson.ipynb", HERE / "lesson.md", HERE / "figures"

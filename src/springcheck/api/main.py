@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -39,7 +40,10 @@ def run(
     seed: int | None = None,
     scheme: str = "",
 ) -> Report:
-    """Run a scene by several methods, compare and judge them, as `springcheck run` does.
+    """Run a scene with several methods, compare the trajectories and judge them, as `springcheck run` does.
+
+    >>> springcheck.run("spring", "own:*euler").counts
+    '24 verdicts passed, 0 failed, 18 not applicable'
 
     Parameters
     ----------
@@ -55,9 +59,9 @@ def run(
     faults
         Names of deliberate faults to run as well, as ``"friction=1e-3"``.
     seed
-        Seed of random methods.
+        Seed of random methods, a whole number.
     scheme
-        The scheme that functions are judged against; by default the one that their states show.
+        The scheme that functions are judged against; by default it is identified.
 
     Returns
     -------
@@ -91,7 +95,10 @@ def simulate(
     seed: int | None = None,
     scheme: str = "",
 ) -> Trajectory:
-    """Run a scene by one method.
+    """Run a scene with one method.
+
+    >>> springcheck.simulate("spring", "own:velocity-verlet").q[-1]
+    array([0.91746551])
 
     Parameters
     ----------
@@ -105,7 +112,7 @@ def simulate(
     seed
         Seed of a random method, a whole number; drawn by default.
     scheme
-        The scheme that a function is judged against; by default the one that its states show.
+        The scheme that a function is judged against; by default it is identified.
 
     Returns
     -------
@@ -128,7 +135,11 @@ def simulate(
 
 @typed
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
-    """Judge a trajectory of a scene by all checks.
+    """Judge a trajectory of a scene with all checks.
+
+    >>> run = springcheck.simulate("spring-uneven", "own:velocity-verlet")
+    >>> springcheck.judge("spring-uneven", run).passed
+    True
 
     Parameters
     ----------
@@ -145,31 +156,28 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     Raises
     ------
     SpringcheckError
-        Frames of another shape than the scene's, or no step, or no scheme.
+        The trajectory has no scheme, no step, or another number of particles than the scene.
     """
     found, run = scene_of(scene), trajectory
     if not run.scheme:
         raise SpringcheckError(
-            f"{run.label}: identify(trajectory, mass=...) says which scheme its states show; judge it "
-            "by that or by its own, as Trajectory.from_arrays(..., scheme='velocity-verlet')"
+            f"{run.label}: no scheme to judge it against; state one, as Trajectory.from_arrays(..., "
+            "scheme='velocity-verlet'), or find it with identify(trajectory, mass=...)"
         )
     frames = len(run.t)
     shapes = {"t": (frames,), "q": (frames, found.n), "p": (frames, found.n), "energy": (frames,)}
     for name, shape in shapes.items():
         values = getattr(run, name)
-        kind = getattr(values, "dtype", None)
-        if values is not None and (kind is None or kind.kind != "f"):
-            given = f"an array of {kind}" if kind is not None else f"a {type(values).__name__}"
-            raise SpringcheckError(
-                f"{run.label}: {name} is {given}; an array of floating-point numbers is needed"
-            )
+        kind = getattr(values, "dtype", type(values).__name__)
+        if values is not None and getattr(kind, "kind", "") != "f":
+            raise SpringcheckError(f"{run.label}: {name} is {kind}; floating-point numbers are needed")
         if values is not None and (np.shape(values) != shape or not frames):
-            raise SpringcheckError(
-                f"{run.label}: {name} has the shape {np.shape(values)}; the times of scene {found.name} "
-                f"need {shape}, and one at least"
-            )
+            given = f"{name} has shape {np.shape(values)}"
+            raise SpringcheckError(f"{run.label}: {given}; scene {found.name} needs {shape}")
     if run.every < 1 or run.step == 0:
-        raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
+        raise SpringcheckError(
+            f"{run.label}: every = {run.every} and step = {run.step:g} give no time between frames"
+        )
     # trajectories made from arrays get the energies of their states
     run = run if run.scene or run.origin else run.of_scene(found)
     verdicts = checks.judge(found, run)
@@ -190,6 +198,10 @@ def compare(
 ) -> Comparison:
     """Compare trajectories of one scene with each other, and with the exact solution where it is known.
 
+    >>> run = springcheck.simulate("spring", "own:velocity-verlet")
+    >>> springcheck.compare("spring", [run, springcheck.exact("spring")])
+    Comparison of exact, own:velocity-verlet: differences up to 0.00889
+
     Parameters
     ----------
     scene
@@ -200,15 +212,18 @@ def compare(
     Returns
     -------
     Comparison
-        Largest difference of every pair, relative to the initial energy norm.
+        `max_difference` (l, l) of each pair of `labels`, relative to the initial energy norm.
+
+    Raises
+    ------
+    SpringcheckError
+        Two trajectories have one label, or one is not of this scene.
     """
     runs: Any = trajectories if isinstance(trajectories, Sequence | Mapping) else [trajectories]
     each = runs.items() if isinstance(runs, Mapping) else [(getattr(x, "label", ""), x) for x in runs]
     named = {label: needed(one, Trajectory, "a Trajectory") for label, one in each}
     if len(named) < max(1, len(runs)):
-        raise SpringcheckError(
-            "compare needs trajectories of unlike labels, or a dict of them by other names"
-        )
+        raise SpringcheckError("two trajectories have one label; give a dict with a name for each")
     return comparing.compare(scene_of(scene), named)
 
 
@@ -224,7 +239,11 @@ def identify(
     friction: float | None = None,
     step: float | None = None,
 ) -> Identification | dict[str, Identification]:
-    """Identify the scheme that made a trajectory, and its errors.
+    """Identify the scheme behind a trajectory, and mistakes in it.
+
+    >>> run = springcheck.simulate("spring", "own:euler")
+    >>> springcheck.identify(run.t, run.q, v=run.p, mass=1.0).scheme
+    'explicit-euler'
 
     Parameters
     ----------
@@ -232,33 +251,30 @@ def identify(
         Times t (f,) [T], a `Trajectory`, a DataFrame with columns t, q and p or v (t may be its index), the
         path of a file, or an integrator ``step(q, p, h, force, mass) -> (q, p)``.
     q, p, v
-        Positions, and momenta or velocities, (f,) or (f, n), where `found` are times.
+        Positions [L], and momenta [M L/T] or velocities [L/T], (f,) or (f, n), where `found` are times.
     mass, stiffness, friction, step
-        Stated values; `friction` is the c of a force -c v.
+        Known values [M], [M/T2], [M/T] and [T]; `friction` is the c of a force -c v.
 
     Returns
     -------
     Identification
-        Of a file, a dict with one for each of its trajectories, by label.
+        `scheme`, `statement` and what was measured.  Of a file, a dict with one for each trajectory.
 
     Raises
     ------
     IdentificationError
-        The states do not show a scheme.
+        The states allow no answer: too few, at rest, or at uneven times.
     """
     from springcheck.identify import files
     from springcheck.identify.report import identify_arrays as of_states
     from springcheck.identify.stepper import identify_stepper
 
+    answer = partial(files.of_springs, stated=stiffness is not None)
     if isinstance(found, str | Path):
-        stated = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
+        known = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
         with spoken():
-            return {
-                one.label: files.of_springs(
-                    files.identify_states(one, **stated), one.whole, stated=stiffness is not None
-                )
-                for one in files.read(path_of(found))
-            }
+            each = files.read(path_of(found))
+            return {one.label: answer(files.identify_states(one, **known), one.whole) for one in each}
     if callable(found):
         return identify_stepper(found)
     t = found
@@ -269,23 +285,22 @@ def identify(
         t, q, p, v = states.t, states.q, states.p, states.v
         mass = states.mass if mass is None else mass
     if t is None or q is None or (p is None and v is None):
-        raise SpringcheckError(
-            "identify needs t, q and p (or v=), a Trajectory, a DataFrame, or the path of a file"
-        )
+        raise SpringcheckError("identify needs t, q and p (or v=), a Trajectory, a DataFrame or a path")
     given: dict[str, Any] = {"t": t, "q": q, "p": p, "v": v, "mass": mass,
              "stiffness": stiffness, "friction": friction, "step": step}  # fmt: skip
     given = {name: x for name, x in given.items() if x is not None}
     arrays = zip(given, reals("identify", **given), strict=True)
     numbers: dict[str, Any] = {name: x if x.ndim else x.item() for name, x in arrays}
     with spoken():
-        told = of_states(**numbers)
-        whole = np.reshape(numbers["q"], (len(numbers["q"]), -1))
-        return files.of_springs(told, whole, stated=stiffness is not None)
+        return answer(of_states(**numbers), np.reshape(numbers["q"], (len(numbers["q"]), -1)))
 
 
 @typed
 def exact(scene: Scene | str | Path) -> Trajectory:
     """The exact solution at the frames of a scene, rounded to double precision.
+
+    >>> springcheck.exact("spring").q[-1]
+    array([0.91294525])
 
     Returns
     -------
@@ -295,12 +310,11 @@ def exact(scene: Scene | str | Path) -> Trajectory:
     Raises
     ------
     SpringcheckError
-        There is no reference solution.
+        The scene has no reference solution; the message says why.
     """
     found = scene_of(scene)
     if not solutions.has_true_motion(found):
-        reason = solutions.no_reference(found)
-        raise SpringcheckError(f"scene {found.name}: no reference solution, because {reason}")
+        raise SpringcheckError(f"scene {found.name}: no reference solution: {solutions.no_reference(found)}")
     steps = np.arange(found.frames, dtype=np.int64) * found.every
     q, p = (np.asarray(x, np.float64) for x in solutions.true_motion(found, steps, found.step))
     return of_scene(found, q, p, label="exact", scheme="exact")
@@ -309,6 +323,9 @@ def exact(scene: Scene | str | Path) -> Trajectory:
 @typed
 def read(path: str | Path) -> dict[str, Trajectory]:
     """Read the trajectories of a store.
+
+    >>> springcheck.read("spring.h5")["own:euler"].q.shape  # doctest: +SKIP
+    (201, 1)
 
     Returns
     -------

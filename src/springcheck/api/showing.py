@@ -34,18 +34,17 @@ class Verdicts(list[Verdict]):
 
     @property
     def cause(self) -> str:
-        """What the states show to be the cause of a failure, or of no judgement, in a sentence; "" where
-        nothing is known."""
+        """The diagnosis of a failure, or of no judgement, in a sentence; "" for none."""
         return checks.cause_of(self) or self._shown
 
     def __repr__(self) -> str:
-        said = [f"  What the states show: {self.cause}"] if self.cause else []
+        said = [f"  Diagnosis: {self.cause}"] if self.cause else []
         return "\n".join([f"Verdicts({self.summary})", *said, *(f"  {verdict!r}" for verdict in self.failed)])
 
     def _repr_html_(self) -> str:
         words = {True: "passed", False: "FAILED", None: "does not apply"}
         rows = [(x.check, words[x.passed], f"{x.value:.3g}", f"{x.bound:.3g}", x.reason) for x in self]
-        said = f"{self.summary}. What the states show: {self.cause}" if self.cause else self.summary
+        said = f"{self.summary}. Diagnosis: {self.cause}" if self.cause else self.summary
         return html_table(said, [("check", "verdict", "value", "bound", "why"), *rows])
 
     def to_dataframe(self) -> Any:

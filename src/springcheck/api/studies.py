@@ -1,4 +1,4 @@
-"""Every study as a function; without a `path` nothing is left on disk."""
+"""The studies, methods, explanations and the page as functions."""
 
 from __future__ import annotations
 
@@ -27,18 +27,26 @@ def precision(
     metric: str = "largest", periods: float | None = None,
     path: str | Path | None = None, force: bool = False,
 ) -> PrecisionStudy | LongTime:  # fmt: skip
-    """Measure error against run time, down to rounding, in about `budget` seconds, without imports.
+    """Measure error against run time and force calls, from the stability limit down to rounding.
+
+    >>> springcheck.precision("spring", "own:rk4", budget=0.2).to_dataframe().columns[4]
+    'max_error'
 
     Parameters
     ----------
-    scene, methods
+    scene, methods, path, force
         As in `run`; by default the scene's methods, and an own one of every order and kind.
+    budget
+        Time to measure [s], without imports.
     metric
         Which error: largest, end, energy or phase.
     periods
-        Run over so many periods at the scene's step instead, as 1e6.
-    path, force
-        Save the result in a store, and overwrite it.
+        Integrate over this number of periods at the scene's step instead, as 1e6.
+
+    Returns
+    -------
+    PrecisionStudy or LongTime
+        A table that prints, and `to_dataframe()` with a row for each step or tolerance.
     """
     from springcheck.studies.precision import METRICS, longtime, measure
 
@@ -60,14 +68,22 @@ def stability(
     scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Stability:  # fmt: skip
-    """Measure limits of stability next to theory, in h omega, and the largest step [T] on this scene.
+    """Measure stability limits in h omega, with those of theory, and the largest step [T] on this scene.
+
+    >>> springcheck.stability("spring", "own:velocity-verlet").to_dataframe()["limit"][0].round(6).item()
+    2.0
 
     Parameters
     ----------
     scene, methods, path, force
         As in `run`.
     workers
-        Processes that measure at once.
+        Number of processes.
+
+    Returns
+    -------
+    Stability
+        A table that prints, and `to_dataframe()` with a row for each method.
     """
     from springcheck.studies.stability import measure
 
@@ -82,14 +98,19 @@ def extremes(
 ) -> Atlas:  # fmt: skip
     """Measure which methods are right at extreme steps, masses and amplitudes.
 
+    >>> print(springcheck.extremes("own:velocity-verlet", quick=True))  # doctest: +SKIP
+
     Parameters
     ----------
-    methods, path, force
-        As in `run`.
+    methods, path, force, workers
+        As in `run` and `stability`.
     quick
-        Take fewer cells (20 s).
-    workers
-        Processes that measure at once.
+        Measure fewer cells (20 s).
+
+    Returns
+    -------
+    Atlas
+        A table that prints: right, unstable as in theory, at a limit of the engine, or silently wrong.
     """
     from springcheck.studies.extremes import measure
 
@@ -102,14 +123,19 @@ def sampling(
     methods: str | Sequence[str] = (), *, path: str | Path | None = None, force: bool = False,
     workers: int = 1,
 ) -> Sampling:  # fmt: skip
-    """Measure how well thermostats sample a spring: temperatures, precision and limits, next to theory.
+    """Measure how well thermostats sample a spring: temperatures, precision and limits, with theory.
+
+    >>> print(springcheck.sampling("own:baoab"))  # doctest: +SKIP
 
     Parameters
     ----------
-    methods, path, force
-        As in `run`.
-    workers
-        Processes that measure at once.
+    methods, path, force, workers
+        As in `run` and `stability`.
+
+    Returns
+    -------
+    Sampling
+        A table that prints, and `to_dataframe()` with a row for each method.
     """
     from springcheck.studies.sampling import measure
 
@@ -119,13 +145,16 @@ def sampling(
 
 @typed
 def methods(scene: Scene | str | Path | None = None) -> Shelf:
-    """All known methods.
+    """List all methods.
+
+    >>> springcheck.methods("spring")[0]
+    {'method': 'own:euler', 'scheme': 'explicit Euler', 'default': True, 'why not': ''}
 
     Returns
     -------
     Shelf
-        Rows with label, scheme, whether it runs by default, and why it cannot be used: its engine is not
-        installed, or it cannot serve `scene`; "" where it can.
+        A list of dicts: label, scheme, whether it runs by default, and why it cannot be used: its engine is
+        not installed, or it cannot serve `scene`; "" where it can.
     """
     from springcheck.cli import listing
 
@@ -134,7 +163,11 @@ def methods(scene: Scene | str | Path | None = None) -> Shelf:
 
 @typed
 def explain(word: str) -> Said:
-    """Explain a check, scheme, method, fault, finding or term.  SpringcheckError for an unknown word."""
+    """Explain a check, scheme, method, fault, finding or term.  SpringcheckError for an unknown word.
+
+    >>> springcheck.explain("ulp")
+    ulp: unit in the last place: the distance between neighbouring numbers, 2**-52 of one between 1 and 2
+    """
     from springcheck.cli import explain as explaining
 
     return Said("\n".join(explaining.lines(needed(word, str, "a word"))))
@@ -143,6 +176,8 @@ def explain(word: str) -> Said:
 @typed
 def report(path: str | Path, output: str | Path | None = None) -> Path:
     """Write a store as one HTML page that checks itself in a browser.
+
+    >>> springcheck.report("spring.h5")  # doctest: +SKIP
 
     Parameters
     ----------
@@ -154,7 +189,7 @@ def report(path: str | Path, output: str | Path | None = None) -> Path:
     Returns
     -------
     Path
-        Where the page is.
+        The page.
 
     Raises
     ------

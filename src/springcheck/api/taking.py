@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from springcheck.studies.keeper import How
 
 Step = Callable[..., Any]
-"""A function ``step(q, p, h, force, mass) -> (q, p)``: numbers of one particle, or arrays (n,); `force(q)`
-gives the force at q."""
+"""A function ``step(q, p, h, force, mass) -> (q, p)`` of numbers or arrays (n,); `force(q)` is the force."""
 
 
 @contextmanager
@@ -29,10 +28,10 @@ def labels_of(methods: Any, scheme: str = "") -> Iterator[list[str]]:
     steps = [one for one in several if not isinstance(one, str)]
     if wrong := [one for one in steps if not callable(one)]:
         raise SpringcheckError(f"a method's label or a function is needed, not {wrong[0]!r}")
-    if not steps and scheme:
-        raise SpringcheckError(f"scheme={scheme!r} goes with a function of yours; methods have their own")
     if not steps:
-        yield [one for one in several if isinstance(one, str)]
+        if scheme:
+            raise SpringcheckError(f"scheme={scheme!r} goes with a function of yours; methods have their own")
+        yield several
         return
     from springcheck.doors import function
 
@@ -62,14 +61,10 @@ def taken(methods: Any, force: bool, workers: int, path: Any = None) -> Iterator
     if path is not None:
         path_of(path)
     if not 1 <= workers <= MOST_PROCESSES:
-        raise SpringcheckError(
-            f"workers={workers}: a number of processes from 1 to {MOST_PROCESSES} is needed"
-        )
+        raise SpringcheckError(f"workers={workers}: a number from 1 to {MOST_PROCESSES} is needed")
     with spoken(), labels_of(methods) as named:
         if workers > 1 and any(label.startswith("stepper:") for label in named):
-            raise SpringcheckError(
-                "workers: a function of yours is known to this process alone; leave it out"
-            )
+            raise SpringcheckError("workers: your function runs in this process only; leave workers out")
         yield named, {"force": force, "progress": None, "team": Processes(int(workers))}
 
 

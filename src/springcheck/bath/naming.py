@@ -36,6 +36,13 @@ ODDS = log(1e6)
 WHITE = 1e-9
 """Probability below which what a map leaves are no draws."""
 
+CORRELATED = 6.2
+"""Standard errors of a correlation with the state, of chance `WHITE`."""
+
+NEIGHBOURS_DIFFER = 0.8
+"""Mean squared difference of what neighbouring states leave, over its variance, below which it follows from
+the state: 2 of draws, less than 0.1 of a smooth function."""
+
 FEWEST_OF_EACH, TRIPLES = 10, 30_000
 """Fewest frames with and without a collision, and triples of frames that are tried for a map."""
 
@@ -213,6 +220,8 @@ def fit(scheme: Thermostat, seen: Noise) -> Fitted | None:
 def _are_draws(x: Floats, z: Floats) -> bool:
     """Whether x (f, 1) are draws, whatever their size: nothing of the states z (f, 2) before them shows in
     them, nor of the draw before, and few come again."""
+    if np.max(np.abs(np.corrcoef(x[:, 0], z.T)[0, 1:])) > CORRELATED / np.sqrt(len(x)):
+        return False
     q, u = (z / np.std(z, axis=0)).T[:, :, None]
     ways = {"q": q, "v": u, "q**2": q * q - np.mean(q * q), "q**3": q**3}
     known = [evidence.Known(name, y) for name, y in ways.items()]
@@ -222,6 +231,15 @@ def _are_draws(x: Floats, z: Floats) -> bool:
     return min(found, tied.chance if tied else 1.0) > WHITE
 
 
+def _follows(x: Floats, z: Floats) -> bool:
+    """Whether what a map leaves, x (f,), follows from the states z (f, 2)."""
+    from scipy.spatial import cKDTree
+
+    each = z / np.std(z, axis=0)
+    nearest = np.asarray(cKDTree(each).query(each, 2)[1])[:, 1]
+    return bool(np.mean((x - x[nearest]) ** 2) < NEIGHBOURS_DIFFER * np.var(x))
+
+
 def thermostats(q: Floats, v: Floats, h: float) -> list[Fitted] | None:
     """Schemes that may have made positions and velocities (f,), a step of h apart, the likeliest first.
 
@@ -229,7 +247,7 @@ def thermostats(q: Floats, v: Floats, h: float) -> list[Fitted] | None:
     single steps of one oscillator.
     """
     seen = noise_of(q, v, h)
-    if seen is None:
+    if seen is None or _follows(seen.left[:, 1], seen.z[:-1]):
         return None
     if (found := _in_two_halves(seen)) is not None or (found := _collided(seen)) is not None:
         return found

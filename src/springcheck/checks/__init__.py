@@ -40,10 +40,10 @@ from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, ste
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
-from springcheck.text.wording import STATES_SHOW, count, few
+from springcheck.text.wording import DIAGNOSIS, count, few
 
 __all__ = [
-    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "STATES_SHOW", "TELLING", "THOROUGH",
+    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "DIAGNOSIS", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
     "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
@@ -117,7 +117,7 @@ def explained(
     frame, few = seldom_off(Case(trajectory=run, scene=scene))
     with np.errstate(all="ignore"):
         said = shown(scene, run, frame, bool(few)) or few
-    why = f"{first.why}{STATES_SHOW}{said}" if said else first.why
+    why = f"{first.why}{DIAGNOSIS}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
@@ -130,7 +130,7 @@ def first_off(scene: Scene, run: Trajectory) -> int:
 
 def cause_of(verdicts: Sequence[Verdict]) -> str:
     """What the states show to be the cause of a failure; "" where that is unknown, or nothing failed."""
-    return next((v.why.partition(STATES_SHOW)[2] for v in verdicts if STATES_SHOW in v.why), "")
+    return next((v.why.partition(DIAGNOSIS)[2] for v in verdicts if DIAGNOSIS in v.why), "")
 
 
 def experiments_of(scene: Scene) -> tuple[Check, ...]:

@@ -15,7 +15,7 @@ from typing import Any
 from springcheck.errors import SpringcheckError, plain
 from springcheck.store import files
 from springcheck.studies.arguments import REPORT_FORMS
-from springcheck.text.wording import STATES_SHOW, count
+from springcheck.text.wording import DIAGNOSIS, count
 
 HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
 """First bytes of a JUnit report; a file that begins otherwise is not overwritten."""
@@ -121,7 +121,7 @@ def _identified(found: dict[str, Any], file: str) -> Iterator[Case]:
 def _reason(verdict: dict[str, Any]) -> str:
     if verdict["passed"] is None:
         return str(verdict["why"])
-    why, _, shown = str(verdict["why"]).partition(STATES_SHOW)
+    why, _, shown = str(verdict["why"]).partition(DIAGNOSIS)
     size = f"{_number(verdict['value'])} of {_number(verdict['bound'])} {verdict['unit']}".strip()
     # the cause is the first sentence
     return f"{shown}. {size}; {why}" if shown else f"{size}; {why}"

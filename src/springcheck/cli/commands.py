@@ -288,9 +288,8 @@ def _doctor(options: Namespace) -> int:
 
 
 FORMATS = (
-    "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
-    ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, Octave text, text tables; texts also "
-    "gzipped"
+    "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, .trr, ASE .traj, "
+    ".xyz, text tables; texts also gzipped"
 )
 """Formats that `springcheck.formats` reads, which is not imported for this text."""
 
@@ -299,7 +298,9 @@ KINDS = ("scenes", "methods", "checks", "terms", "schemes")
 
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
-_NAMES = argument("--columns", metavar="NAMES", help="a table's columns, as t,q,v; of HDF5 as t=a,q=b,v=c")
+_NAMES = argument(
+    "--columns", metavar="NAMES", help="a table's columns, as t,q,v, - leaves one out; of HDF5 as t=a,q=b,v=c"
+)
 _STEPS = argument("--step", "--dt", type=float, metavar="H", help="the time step of a file that counts steps")
 
 COMMANDS = (

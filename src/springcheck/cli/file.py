@@ -20,7 +20,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import choose, keeper
-from springcheck.studies.text import left_out
+from springcheck.studies.choose import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 

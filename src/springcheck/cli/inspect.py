@@ -60,11 +60,10 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
             ),
             plain(f"versions: {_versions(summary)}; --json has them and the digests of each run", "dim"),
         ]
-    out += [plain(f"table {name}") for name in summary.tables]
     for study, result in results:
         if not study.trajectories:
             out += [plain(), *study.lines(result, options, summary.path)]
-    return out
+    return [*out, *[plain()] * bool(summary.tables), *(plain(f"table {x}", "dim") for x in summary.tables)]
 
 
 def _left(summary: store.Summary) -> Lines:

@@ -166,7 +166,7 @@ def progress(title: str, *, quiet: bool) -> Iterator[Progress | None]:
         return
     import rich.progress
     from rich.console import Console
-    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     bars = rich.progress.Progress(
         TextColumn("{task.description}", markup=False),
@@ -178,12 +178,22 @@ def progress(title: str, *, quiet: bool) -> Iterator[Progress | None]:
         console=Console(stderr=True),
         transient=True,
     )
-    task: list[TaskID] = []
-
-    def told(done: float, whole: float, what: str = "") -> None:
-        if not task:
-            task.append(bars.add_task(title, total=whole))
-        bars.update(task[0], completed=done, total=whole, description=f"{title}: {what}" if what else title)
-
     with bars:
-        yield told
+        yield _Bar(bars, title)
+
+
+class _Bar:
+    """A progress bar, and above it results as soon as they are known."""
+
+    def __init__(self, bars: Any, title: str) -> None:
+        self._bars, self._title, self._task = bars, title, None
+
+    def __call__(self, done: float, whole: float, what: str = "") -> None:
+        if self._task is None:
+            self._task = self._bars.add_task(self._title, total=whole)
+        said = f"{self._title}: {what}" if what else self._title
+        self._bars.update(self._task, completed=done, total=whole, description=said)
+
+    def line(self, text: str) -> None:
+        """Print a result."""
+        self._bars.console.print(text, highlight=False, markup=False)

@@ -58,7 +58,9 @@ class Parser(argparse.ArgumentParser):
         print(message, end="", file=file, flush=True)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        found, extra = self.parse_known_args(args, namespace)
+        # names may begin with -, which leaves a column out
+        words = re.sub(r"(?<=\0--columns)\0(?=-,)", "=", "\0".join(["", *args])).split("\0")[1:]
+        found, extra = self.parse_known_args(words, namespace)
         if extra:
             (commands,) = (x for x in self._actions if isinstance(x, argparse._SubParsersAction))
             command = commands.choices[found.name]

@@ -1,4 +1,9 @@
-"""The engine contract: what an engine declares, and what a simulation does."""
+"""The engine contract: what an engine declares, and what a simulation does.
+
+>>> leap = Method(name="leap", scheme="velocity-verlet", about="one function")
+>>> Engine(name="mine", title="Mine", methods=named(leap), start=print, version=dict).methods["leap"].default
+True
+"""
 
 from __future__ import annotations
 
@@ -79,7 +84,7 @@ class Method:
     scripted: bool = False
     """Whether its seed may be a generator of one's own, an object with `standard_normal(size)`."""
     note: str = ""
-    """A remark of the library's authors for beside a finding, and the thread where they made it."""
+    """A remark of the library's authors on a finding, and the thread where they made it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,18 +114,24 @@ class Simulation(Protocol):
         ...
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
-        """Fill q and p (f, n): row i holds the state `every` steps after row i-1, both at the same time.
+        """Fill q [L] and p [M L/T], both (f, n): row i is the state `every` steps after row i-1, at one time.
 
-        An engine that stops by itself raises `Stopped`, with the rows before left filled.
+        Raises `Stopped` if the engine stops by itself; the rows before stay filled.
         """
         ...
 
 
 class Stopped(Exception):  # noqa: N818 - an outcome, not an error
-    """An engine gave up: the rows that it had filled, and its message.
+    """An engine gave up after filling some rows.
 
-    `fastest`: the largest speed that it gives a body [L/T], where that is why.  `is_limit`: it moves nothing
-    beyond a limit of its own, which the message names.
+    Parameters
+    ----------
+    rows, message
+        Number of rows that it had filled, and why it stopped.
+    fastest
+        The largest speed that it gives a body [L/T], where that is the reason.
+    is_limit
+        Whether it stopped at a limit of its own, which the message names.
     """
 
     def __init__(self, rows: int, message: str, *, fastest: float = inf, is_limit: bool = False) -> None:
@@ -138,8 +149,8 @@ class Engine:
     methods: Mapping[str, Method] = field(default_factory=dict)
     """By name; see `named`."""
     start: Callable[..., Simulation]
-    """start(scene, method, label, step): the engine at the scene's start.  The step may be negative.  Of a
-    random method it takes one more argument by name, its seed."""
+    """start(scene, method, label, step): the engine in the initial state.  The step [T] may be negative.
+    For a random method it takes the keyword `seed` too."""
     version: Callable[[], Mapping[str, str]]
     """Versions of the library and of its own dependencies, by name."""
     arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()

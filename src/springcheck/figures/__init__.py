@@ -1,1 +1,1 @@
-"""Charts as data, and as pictures; each study describes its own (`page.py` beside its measure)."""
+"""Charts as data, and as pictures; the results of studies describe their own (`banks`)."""

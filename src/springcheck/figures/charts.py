@@ -1,6 +1,6 @@
 """Charts as plain data: what a study shows in figures (`render`) and in the report page beside its text.
 
-A study's folder may hold `page.banks(result)`.  Numbers are the stored doubles; `plain` makes of a bank
+The results of studies have them (`banks`).  Numbers are the stored doubles; `plain` makes of a bank
 what JSON can hold.
 """
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from math import pi
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -21,25 +22,39 @@ Columns: TypeAlias = Mapping[str, Floats]
 Kind: TypeAlias = Literal["t", "q", "p", "v", "m"]
 
 NAMES: dict[Kind, str] = {
-    "t": r"t|time|times|zeit|temps|tid|tiempo",
-    "q": r"q|r|(pos|position|positions|coordinate|coordinates)([_ ][xyz])?|[xyz]|angle|theta|phi"
-    r"|auslenkung|ort|displacement|posisjon",
-    "p": r"p(_?[xyz])?|(mom|momentum|momenta)([_ ][xyz])?",
-    "v": r"v(_?[xyz])?|(vel|velocity|velocities)([_ ][xyz])?|[qxyz](_?dot|')|d[qxyz]/?dt|omega"
-    r"|angular[_ ]velocity|theta_?dot|speed|geschwindigkeit|vitesse|fart|hastighet",
-    "m": r"m|mass|masses",
+    "t": r"t|times?|zeit|temps|tid|tiempo",
+    "q": r"q|r|(pos|positions?|coordinates?)([_ ][xyz])?|[xyz]|angle|theta|phi|winkel|vinkel|auslenkung|ort"
+    r"|weg|displacement|posisjon|utslag|[ée]longation|allongement|d[ée]placement|abscisse|posici[óo]n",
+    "p": r"p(_?[xyz])?|(mom|moment(um|a))([_ ][xyz])?|impuls|bevegelsesmengde|quantit[ée] de mouvement",
+    "v": r"v(_?[xyz])?|(vel|velocity|velocities)([_ ][xyz])?|([qxyz]|theta|phi)(_?dot|')|d([qxyz]|theta)/?dt"
+    r"|omega|angular[_ ]velocity|speed|(winkel)?geschwindigkeit|vitesse([_ ]angulaire)?|(vinkel)?hastighet"
+    r"|fart|velocidad",
+    "m": r"m|mass|masses|masse",
 }
+ENERGY = r"e[_ ]?(tot|total|kin|pot)?|hamiltonian|((total|kinetic|potential)[_ ])?energy"
 
+LENGTHS = {
+    "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12, "km": 1e3, "angstrom": 1e-10,
+    "å": 1e-10, "rad": 1.0, "deg": pi / 180, "degrees": pi / 180, "°": pi / 180,
+}  # fmt: skip
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12, "fs": 1e-15, "min": 60.0, "h": 3600.0}
+ANGLES = "rad", "deg", "degrees", "°"
+"""Units that a column's name may state: lengths or angles, and times, in m, rad and s."""
 
 FEWEST_SINGLE, FEW_ROWS, SHORT = 8, 1000, 0xFFF
 """Evidence that numbers are of single precision: so many different ones in so many rows, and bits among the
 last of the 24 set in some.  None is set in numbers that no step has rounded, such as 0.75."""
 
+MOST_NUMBERS = 1 << 24
+"""Numbers of one trajectory."""
 LONGEST_NAME = 200
 """Characters of a column's name; patterns take the square of it."""
+SLOPE = 0.2
+"""Largest relative difference of velocities from the differences of positions over those of times."""
 
 ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Euler: record velocities too"
 """Note on a file that cannot distinguish schemes which share one recurrence of the positions."""
+ANEW = "name all columns, as --columns t,q,v; - leaves one out, as -,t,q,v"
 
 
 class Fixed(NamedTuple):
@@ -68,9 +83,9 @@ class States:
     fixed: Fixed | None = None
     """How text with fixed decimals is rounded; None for other numbers."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Units of q, v, t and mass, as an H5MD file states them."""
+    """Units of q, v, t and mass, as the file states them."""
     notes: tuple[str, ...] = ()
-    """Parts of the file that were left out."""
+    """Parts of the file that were left out or converted."""
 
 
 Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
@@ -78,11 +93,29 @@ Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
 
 
 def fitting(path: Path, found: States) -> States:
-    """States whose masses fit their positions; StoreError where they do not."""
+    """States with velocities in the units of positions and times, and angles in rad; StoreError where masses
+    do not fit positions."""
     if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
         raise StoreError(f"{path}: masses: {len(found.mass)}, columns of q: {found.q.shape[1]}")
-    # decimals that hold numbers of single precision have no more of its digits
-    return replace(found, roundoff=max(found.roundoff, found.fixed.beside)) if found.fixed else found
+    if found.fixed:
+        # decimals that hold numbers of single precision have no more of its digits
+        found = replace(found, roundoff=max(found.roundoff, found.fixed.beside))
+    q, t, v = (found.units.get(what, "").lower().replace("µ", "u") for what in "qtv")
+    of, over = [*re.split(r"\s*/\s*|[ ·*](?=\w+\^?-1$)", v), ""][:2]
+    over = over.removesuffix("-1").removesuffix("^")
+    known = {q, of} <= LENGTHS.keys() and {t, over} <= TIMES.keys() and (q in ANGLES) == (of in ANGLES)
+    if not known or found.v is None:
+        return found
+    turned, unit = (LENGTHS[q], "rad") if q in ANGLES else (1.0, q)
+    factor = turned * LENGTHS[of] / LENGTHS[q] * TIMES[t] / TIMES[over]
+    notes = [f"positions in {q} were multiplied by {turned:.6g}: rad"] * (turned != 1)
+    notes += [f"velocities in {of}/{over} were multiplied by {factor:.6g}: {unit}/{t}"] * (factor != 1)
+    if not notes:
+        return found
+    fixed = found.fixed and Fixed(found.fixed.q * turned, found.fixed.v * factor, found.fixed.beside)
+    units = {**found.units, "q": unit, "t": t, "v": f"{unit} {t}-1"}
+    q, v = found.q * turned, found.v * factor
+    return replace(found, q=q, v=v, fixed=fixed, units=units, notes=(*found.notes, *notes))
 
 
 def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
@@ -105,7 +138,7 @@ def moving(path: Path, found: States) -> States:
 
 @lru_cache(maxsize=4096)
 def kind(name: str) -> Kind | None:
-    """Quantity that a column of this name holds; units in brackets, numbers and case are ignored."""
+    """Quantity that a column of this name holds; units, numbers and case are ignored."""
     bare, _ = _parted(name)
     found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, bare)]
     return found[0] if found else None
@@ -132,21 +165,26 @@ def kinds(names: Collection[str]) -> dict[str, Kind]:
 
 
 def _is_capital(name: str) -> bool:
-    bare = _without_unit(name[:LONGEST_NAME])
+    bare = _with_unit(name[:LONGEST_NAME])[0]
     return len(bare) == 1 and bare.isupper()
 
 
-def _without_unit(name: str) -> str:
+def _with_unit(name: str) -> tuple[str, str]:
+    """A name, and its unit: ("Zeit", "s") of ``Zeit [s]``, ``Zeit (s)`` or ``Zeit / s``."""
     bare = re.sub(r"^'(.*)'$", r"\1", name.strip().strip('"#').strip())
+    # GROMACS heads its columns so
+    bare = re.sub(r"^atom (\d+) ([XYZ])$", r"\2\1", bare)
     # the index of an array is its number
-    return re.sub(r"[\[(].*?[\])]", "", re.sub(r"(?<=[^\W\d])\s*[\[(](\d+)[\])]", r"_\1", bare)).strip()
+    bare = re.sub(r"(?<=[^\W\d])\s*[\[(](\d+)[\])]", r"_\1", bare)
+    bare, *units = re.split(r"[\[(](.*?)[\])]| / | in |[_ ](?=deg$|rad$)", bare, maxsplit=1)
+    return bare.strip(), " ".join(filter(None, units)).strip()
 
 
 def _parted(name: str) -> tuple[str, str]:
     """A name without its unit and case, and the number at its end, or before the sign of a derivative."""
     if len(name) > LONGEST_NAME:
         return "", ""
-    bare = re.sub(r"(\d+)(_?dot|'|/?dt)$", r"\2\1", _without_unit(name).lower())
+    bare = re.sub(r"(\d+)(_?dot|'|/?dt)$", r"\2\1", _with_unit(name)[0].lower())
     found = re.search(r"[\s_.]*(\d*)$", bare)
     return (bare[: found.start()], found[1]) if found else (bare, "")
 
@@ -167,8 +205,11 @@ def _by_place(parts: Sequence[Floats], places: Sequence[tuple[str, float]]) -> F
     return np.asarray(np.hstack(parts)[:, np.lexsort((axis, particle, number))])
 
 
-def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
-    """Named columns as states.  StoreError names those that are missing or do not fit together."""
+def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float | None = None) -> States:
+    """Named columns as states; without times, frames are a `step` apart, where it is stated.
+
+    StoreError names those that are missing or do not fit together.
+    """
     parts: dict[Kind, list[Floats]] = {}
     places: dict[Kind, list[tuple[str, float]]] = {}
     meant = kinds(columns)
@@ -190,17 +231,18 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
             parts[what] = [_by_place(parts[what], places[what])]
         if "m" in places and {*places["m"]} == {("", number) for _, number in places.get("q", ())}:
             parts["m"] = [_by_place(parts["m"], places["m"])]
-    for what, why in (("t", "times"), ("q", "positions")):
-        if what not in parts:
-            how = "name all columns, as --columns t,q,v"
-            raise StoreError(f"{path}: no column of {why} among {listed(columns)}; {how}")
+    if "q" not in parts:
+        _energies_alone(path, columns)
+        raise StoreError(f"{path}: no column of positions among {listed(columns)}; {ANEW}")
+    if "t" not in parts:
+        if step is None:
+            how = "; or give the time between frames, as --step H"
+            raise StoreError(f"{path}: no column of times among {listed(columns)}; {ANEW}{how}")
+        parts["t"] = [times(path, np.arange(len(parts["q"][0]))[:, None], step)]
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
-        times = [name for name, what in meant.items() if what == "t"]
-        raise StoreError(
-            f"{path}: columns of times: {t.shape[1]} ({listed(times)}), and there is one time; name "
-            "all columns anew by --columns, the others of these by words that mean no quantity: t,other,q,v"
-        )
+        names = listed(name for name, what in meant.items() if what == "t")
+        raise StoreError(f"{path}: columns of times: {t.shape[1]} ({names}), and there is one time; {ANEW}")
     states = {what: np.hstack(parts[what]) for what in parts if what != "m"}
     n = states["q"].shape[1]
     for what, values in states.items():
@@ -219,7 +261,24 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     return States(
         t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
         mass=None if mass is None else mass[0], notes=(f"{listed(left)} {said}",) if left else (),
+        units={what: unit for name, what in meant.items() if (unit := _with_unit(name)[1])},
     )  # fmt: skip
+
+
+def _energies_alone(path: Path, columns: Columns) -> None:
+    """StoreError where columns are energies: what they show, and what they do not."""
+    found = {name: x for name, x in columns.items() if re.fullmatch(ENERGY, _parted(name)[0])}
+    if not found:
+        return
+    parts = {name: x for name, x in found.items() if re.search("kin|pot", name, re.IGNORECASE)}
+    whole = {name: x for name, x in found.items() if name not in parts}
+    name, total = next(iter(whole.items())) if whole else (" + ".join(parts), sum(parts.values()))
+    size = float(np.max(np.abs(total))) or 1.0
+    shown = f"{np.ptp(total) / size:.2g} of its size, {(total[-1] - total[0]) / size:+.2g} from start to end"
+    raise StoreError(
+        f"{path}: holds energies alone ({listed(found)}): {plain(name, 80)} changes by {shown}. That shows "
+        "drift, and no scheme: record positions and velocities too"
+    )
 
 
 def is_single(x: Floats) -> bool:
@@ -240,13 +299,28 @@ def listed(names: Iterable[str]) -> str:
     return f"{shown} ..." if len(names) > 8 else shown
 
 
+def is_rate(t: Floats, q: Floats, v: Floats) -> bool:
+    """Whether one column is the derivative of another."""
+    if len(t) < 5 or not np.all(np.diff(t) > 0):
+        return False
+    with np.errstate(all="ignore"):
+        off = (q[2:] - q[:-2]) / (t[2:] - t[:-2]) - v[1:-1]
+        return bool(np.linalg.norm(off) <= SLOPE * np.linalg.norm(v[1:-1]) > 0)
+
+
 def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:
-    """The columns of a table (f, c) under names; StoreError where the numbers of the two differ."""
+    """The columns of a table (f, c) under names; StoreError where the numbers of the two differ.
+
+    Without names, three columns of which the last is the rate of the second are t, q and v.
+    """
+    if not names and values.shape[1] == 3 and is_rate(*values.T):
+        names = ["t", "q", "v"]
     if not names:
         how = f"give all {values.shape[1]}, as --columns t,q,v"
-        raise StoreError(f"{path}: its columns have no names; {how}")
+        raise StoreError(f"{path}: its columns have no names; {how}; - leaves one out")
     if len(names) != values.shape[1]:
-        raise StoreError(f"{path}: columns: {values.shape[1]}, names: {len(names)}: {listed(names)}")
+        how = "- leaves a column out, as --columns -,t,q,v"
+        raise StoreError(f"{path}: columns: {values.shape[1]}, names: {len(names)}: {listed(names)}; {how}")
     out: dict[str, Floats] = {}
     for i, name in enumerate(names):
         # columns may share a name, as the q of several particles do

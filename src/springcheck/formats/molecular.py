@@ -1,4 +1,4 @@
-"""Files of molecular programs that no library reads in full precision: LAMMPS dumps, .trr, plain .xyz.
+"""Frames of atoms: LAMMPS dumps and .xyz as text, .trr in the precision in which it was written.
 
 Each in its own units: GROMACS' are nm, ps and u, those of a dump are LAMMPS' own.
 """
@@ -7,26 +7,35 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Fixed, Floats, States, times
-from springcheck.formats.lines import MOST_NUMBERS, Lines, number
-from springcheck.formats.tables import SHOWN, fixed, roundoff
+from springcheck.formats.columns import MOST_NUMBERS, Fixed, Floats, States, times
+from springcheck.formats.digits import SHOWN, fixed, number, roundoff
+from springcheck.formats.tables import Lines
+
+R, V, P = ("x", "y", "z"), ("vx", "vy", "vz"), ("px", "py", "pz")
+IMAGES = "ix", "iy", "iz"
+"""Counters of the borders that wrapped positions have crossed."""
+
+Frame: TypeAlias = tuple[float | None, int, int, list[str]]
+"""Time, number of the step, number of atoms, and names of their columns."""
 
 
-def clock(path: Path, said: Sequence[float | None], step: float | None, unit: str = "") -> Floats:
+def clock(
+    path: Path, said: Sequence[float | None], step: float | None, steps: Any = None, unit: str = ""
+) -> Floats:
     """The times that the frames state, or where none does, those of counted steps."""
     known = [one for one in said if one is not None]
     if not known:
-        return times(path, range(len(said)), step, unit)
+        return times(path, range(len(said)) if steps is None else steps, step, unit)
     if len(known) < len(said):
-        raise StoreError(f"{path}: frame {[*said].index(None)} says no time, as others do")
+        how = "; give its time step, as --step H" * (step is None)
+        raise StoreError(f"{path}: frame {[*said].index(None)} says no time, as others do{how}")
     return np.array(known)
 
 
@@ -52,97 +61,109 @@ def of_frames(
     return States(t=at, q=where, p=None, v=flat, mass=m, roundoff=roundoff, fixed=fixed)
 
 
-@contextmanager
-def _frames(path: Path, what: str) -> Iterator[Lines]:
-    """The lines of a file of frames; errors name the line."""
+def _read(path: Path, step: float | None, what: str, begins: Callable[[Lines], Iterator[Frame]]) -> States:
+    """The states of a text of frames; `begins` reads the head of a frame, whose atoms are rows."""
+    heads: list[Frame] = []
+    numbers = array("d")
+    first: list[list[str]] = []
+    symbols: list[str] = []
+    wanted: dict[str, int] = {}
     with Lines(path) as lines:
         try:
-            yield lines
+            for head in begins(lines):
+                _, _, n, names = head
+                if not 0 < n <= MOST_NUMBERS // 6:
+                    raise lines.wrong(f"{n} atoms are none that can be read")
+                if heads and (n, names) != heads[0][2:]:
+                    raise lines.wrong(
+                        f"the number of atoms changes from {heads[0][2]} to {n}, or their columns"
+                    )
+                heads.append(head)
+                for _ in range(n):
+                    cells = lines.take().split()
+                    wanted = wanted or _wanted(path, names[: len(cells)])
+                    row = [cells[i] for i in wanted.values()]
+                    numbers.extend(map(number, row))
+                    if len(first) < SHOWN:
+                        first.append(row)
+                    if len(heads) == 1 and "species" in names:
+                        symbols.append(cells[names.index("species")])
         except ValueError as error:
             raise lines.wrong(f"is no {what}: {str(error)[:100]}") from error
         except IndexError:
             raise lines.wrong(f"is no {what}: it has fewer words than it should have") from None
-        except StopIteration:
-            raise lines.wrong("is damaged or cut off") from None
-
-
-def _atoms(text: str, lines: Lines, before: int | None) -> int:
-    """The number of atoms that a frame announces."""
-    n = int(text)
-    if not 0 < n <= MOST_NUMBERS // 6:
-        raise lines.wrong(f"{n} atoms are none that can be read")
-    if before not in (None, n):
-        raise lines.wrong(f"the number of atoms changes from {before} to {n}")
-    lines.count(6 * n)
-    return n
-
-
-def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
-    """A text dump with id, positions (x or xu), velocities (vx), and optionally the mass."""
-    steps: list[int] = []
-    clock: list[float] = []
-    numbers = array("d")
-    first: list[list[str]] = []
-    names: list[str] = []
-    n: int | None = None
-    with _frames(path, "LAMMPS dump") as lines:
-        for line in lines:
-            # before the number of the step, as `dump_modify units yes time yes` asks for them
-            item = line
-            while item.startswith(("ITEM: UNITS", "ITEM: TIME")) and "STEP" not in item:
-                said = next(lines)
-                if item.startswith("ITEM: TIME"):
-                    clock.append(float(said))
-                item = next(lines)
-            if not item.startswith("ITEM: TIMESTEP"):
-                raise lines.wrong("ITEM: TIMESTEP is expected")
-            steps.append(int(next(lines)))
-            item, announced = next(lines), 0
-            while not item.startswith("ITEM: ATOMS"):
-                if item.startswith("ITEM: NUMBER OF ATOMS"):
-                    announced = n = _atoms(next(lines), lines, n)
-                item = next(lines)
-            if not announced:
-                raise lines.wrong("ITEM: NUMBER OF ATOMS is missing before it")
-            wanted = _wanted(path, item.split()[2:])
-            if names and list(wanted) != names:
-                raise lines.wrong("its columns change")
-            names = list(wanted)
-            for _ in range(announced):
-                cells = next(lines).split()
-                row = [cells[i] for i in wanted.values()]
-                values = [float(cell) for cell in row]
-                if "ix" in wanted and any(values[-3:]):
-                    raise lines.wrong("positions are wrapped into a box; dump xu yu zu in place of x y z")
-                numbers.extend(values)
-                if len(first) < SHOWN:
-                    first.append(row[:6])
-    table = np.frombuffer(numbers).reshape(len(steps), n or 1, len(names))
-    if "id" in names:
-        order = np.argsort(table[:, :, names.index("id")], axis=1, kind="stable")
+    if not heads:
+        raise StoreError(f"{path}: is no {what}")
+    at = {name: i for i, name in enumerate(wanted)}
+    table = np.frombuffer(numbers).reshape(len(heads), heads[0][2], len(wanted))
+    if "id" in at:
+        order = np.argsort(table[:, :, at["id"]], axis=1, kind="stable")
         table = np.take_along_axis(table, order[:, :, None], axis=1)
-        ids = table[:, :, names.index("id")]
+        ids = table[:, :, at["id"]]
         if np.any(others := np.any(ids != ids[0], axis=1)):
             raise StoreError(f"{path}: frame {np.argmax(others)} has other atoms than the first, by their id")
-    q, v = table[:, :, :3], table[:, :, 3:6]
-    mass = table[0, :, names.index("mass")] if "mass" in names else None
+    if "ix" in at and np.any(table[:, :, [at[name] for name in IMAGES]]):
+        raise StoreError(f"{path}: positions are wrapped into a box; dump xu yu zu in place of x y z")
+    mass = table[0, :, at["mass"]] if "mass" in at else _masses(path, symbols)
+    rates = next((names for names in (V, P) if names[0] in at), ())
+    of = len(R), len(R) + len(rates)
     # LAMMPS writes 6 digits unless dump_modify asks for more
-    known = step is None and len(clock) == len(steps)
-    when = np.array(clock) if known else times(path, steps, step)
-    told = roundoff(first, range(6)), fixed(first, range(3), range(3, 6))
-    return of_frames(path, when, q, v, mass, *told)
+    told = roundoff(first, range(of[1])), fixed(first, range(of[0]), range(*of))
+    q, v = table[:, :, : of[0]], table[:, :, of[0] : of[1]] if rates else None
+    if rates == P and v is not None and mass is not None:
+        from ase.units import fs
+
+        v = v / mass[:, None] * fs
+        told = told[0], told[1] and told[1]._replace(v=told[1].v * np.repeat(fs / mass, 3))
+    t = clock(path, [one[0] for one in heads], step, [one[1] for one in heads])
+    return of_frames(path, t, q, v, mass, *told)
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:
-    """Columns of positions, velocities and, where written, masses and numbers of atoms."""
-    pairs = ["xu" if "xu" in names else "x", "yu" if "yu" in names else "y", "zu" if "zu" in names else "z"]
-    wanted = [*pairs, "vx", "vy", "vz"]
-    lacking = [name for name in wanted if name not in names]
-    if lacking:
-        raise StoreError(f"{path}: its atoms have no {', '.join(lacking)}; dump x y z vx vy vz")
-    # counters of the borders that wrapped positions have crossed
-    images = ["ix", "iy", "iz"] if {"x", "ix", "iy", "iz"} <= set(names) and "xu" not in names else []
-    return {name: names.index(name) for name in (*wanted, "mass", "id", *images) if name in names}
+    """Places of positions, of velocities or momenta, and of masses, numbers of atoms and images."""
+    unwrapped = {name: f"{name}u" for name in R if f"{name}u" in names}
+    known = {name: names.index(unwrapped.get(name, name)) for name in (*R, *V, *P) if
+             unwrapped.get(name, name) in names}  # fmt: skip
+    if not {*R} <= known.keys():
+        raise StoreError(f"{path}: its atoms have no x, y and z, but {' '.join(names)[:100]}")
+    rates = next((group for group in (V, P) if {*group} <= known.keys()), ())
+    others = ("mass", "id", *(IMAGES if "x" in names and not unwrapped and {*IMAGES} <= {*names} else ()))
+    return {name: known[name] for name in (*R, *rates)} | {
+        name: names.index(name) for name in others if name in names
+    }
+
+
+def _masses(path: Path, symbols: list[str]) -> Floats | None:
+    """Masses of the elements, as ASE has them [u]; None where the file names no species."""
+    if not symbols:
+        return None
+    from ase.data import atomic_masses, atomic_numbers
+
+    return np.array([atomic_masses[atomic_numbers.get(symbol, 0)] for symbol in symbols])
+
+
+def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
+    """A text dump with positions (x or xu), velocities (vx), and optionally id and mass."""
+
+    def begins(lines: Lines) -> Iterator[Frame]:
+        for line in lines:
+            item, time, steps, n = line, None, None, 0
+            if not item.startswith("ITEM: "):
+                raise lines.wrong("ITEM: TIMESTEP is expected")
+            while not item.startswith("ITEM: ATOMS"):
+                if item.startswith("ITEM: TIMESTEP"):
+                    steps = int(lines.take())
+                elif item.startswith("ITEM: TIME"):
+                    # where `dump_modify time yes` asks for it
+                    time = float(lines.take())
+                elif item.startswith("ITEM: NUMBER OF ATOMS"):
+                    n = int(lines.take())
+                item = lines.take()
+            if steps is None or not n:
+                raise lines.wrong("ITEM: TIMESTEP and ITEM: NUMBER OF ATOMS are missing before it")
+            yield None if step is not None else time, steps, n, item.split()[2:]
+
+    return _read(path, step, "LAMMPS dump", begins)
 
 
 def is_xyz(head: bytes) -> bool:
@@ -153,33 +174,35 @@ def is_xyz(head: bytes) -> bool:
 
 
 def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
-    """Plain .xyz: a name and three numbers for each atom, and three more where it has velocities.
+    """An .xyz file: a name and three numbers for each atom, and three more where it has velocities, or the
+    columns that an extended one names.
 
-    The comment of a frame may hold its time, as ``t = 0.1``.
+    The comment of a frame may hold its time, as ``t = 0.1``.  ASE's momenta become velocities per fs.
     """
-    t: list[float | None] = []
-    numbers = array("d")
-    first: list[list[str]] = []
-    n: int | None = None
-    width = 0
-    with _frames(path, ".xyz frame") as lines:
-        for line in lines:
-            if not line.strip():
-                continue
-            n = _atoms(line, lines, n)
-            t.append(_time(next(lines)))
-            for _ in range(n):
-                cells = next(lines).split()[1:]
-                width = width or (6 if len(cells) >= 6 else 3)
-                numbers.extend(number(cell) for cell in cells[:width])
-                if len(numbers) % width or len(cells) < width:
-                    raise lines.wrong(f"an atom has {width} numbers, not {len(cells)}")
-                if len(first) < SHOWN:
-                    first.append(cells[:width])
-    table = np.frombuffer(numbers).reshape(len(t), n or 1, width or 3)
-    v = table[:, :, 3:] if width == 6 else None
-    known = roundoff(first, range(width)), fixed(first, range(3), range(3, width))
-    return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, *known)
+
+    def begins(lines: Lines) -> Iterator[Frame]:
+        for i, line in enumerate(filter(str.strip, lines)):
+            comment = lines.take()
+            yield _time(comment), i, int(line), _properties(comment) or ["", *R, *V]
+
+    return _read(path, step, ".xyz frame", begins)
+
+
+RATES = "velocities", "velocity", "vel", "velo", "v"
+NAMED = {"pos": R, "momenta": P, "masses": ("mass",), **dict.fromkeys(RATES, V)}
+"""Columns of extended .xyz by our names for them."""
+
+
+def _properties(comment: str) -> list[str]:
+    """Names of the columns of extended .xyz, from ``Properties=species:S:1:pos:R:3``; none in others."""
+    said = comment.partition("Properties=")[2].split()[:1]
+    words = said[0].strip('"').split(":") if said else []
+    names: list[str] = []
+    for name, width in zip(words[::3], words[2::3], strict=False):
+        many = min(int(width), 99)
+        known = NAMED.get(name.lower(), ())
+        names += known if len(known) == many else [name.lower()] * many
+    return names
 
 
 def _time(comment: str) -> float | None:

@@ -2,39 +2,57 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import (
-    Fixed,
-    Floats,
-    States,
-    counts_steps,
-    kinds,
-    listed,
-    named,
-    split,
-    times,
-)
-from springcheck.formats.lines import Lines, number
+from springcheck.formats.columns import Floats, States, counts_steps, kinds, listed, named, split, times
+from springcheck.formats.digits import SHOWN, fixed, number, roundoff
 
-SHOWN = 1000
-"""Rows whose digits are counted."""
-FEWEST_CELLS = 8
-"""Different numbers of nine digits, too many to be of single precision by chance."""
-FEWEST_LONG = 20
-"""Numbers that would need 17 digits as doubles, by expectation, of which none has them in text of 16."""
-AS_WIDE = 0.75
-"""Share of the numbers of a column that are as wide as any where all were cut off at one width: of others the
-last digits are zeros by chance, and may be left out."""
 COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
+MOST_LABELS = 1000
+"""Characters of a row in which labels stand beside numbers, as in ``t=0.1 x=0.2``."""
+
+
+class Lines:
+    """The lines of a text, counted; how long it may be is a matter of the process that reads it."""
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as raw:
+            opened = gzip.open if raw.read(2) == b"\x1f\x8b" else open
+        self.path, self.number = path, 0
+        self._file = opened(path, "rt", encoding="utf-8-sig")
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        line = next(self._file)
+        self.number += 1
+        return line.rstrip("\r\n")
+
+    def take(self) -> str:
+        """The next line of a frame.  StoreError at the end of the file."""
+        for line in self:
+            return line
+        raise self.wrong("is damaged or cut off")
+
+    def wrong(self, what: str) -> StoreError:
+        """An error that names file and line."""
+        return StoreError(f"{self.path}, line {self.number}: {what}")
+
+    def __enter__(self) -> Lines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
@@ -48,7 +66,6 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     with Lines(path) as lines:
         for line in lines:
             if len(first) == SHOWN and width > 1 and (row := _plain(line)) and len(row) == width:
-                lines.count(width)
                 numbers.extend(row)
                 continue
             if width == 1 and len(first) == SHOWN:
@@ -56,7 +73,12 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             if not width and line.lstrip().startswith("@"):
                 legends += _legend(line)
                 continue
-            cells, is_comment = _cells(line), line.lstrip().startswith(COMMENT)
+            names, cells = _labelled(line) if "=" in line[:MOST_LABELS] else ([], _cells(line))
+            if names:
+                legends = legends or names
+                if names != legends:
+                    raise lines.wrong(f"columns {listed(names)}, before it {listed(legends)}")
+            is_comment = line.lstrip().startswith(COMMENT)
             row = _numbers(cells)
             if not cells or (is_comment and (width or row)):
                 continue
@@ -78,7 +100,6 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             width = width or len(row)
             if len(row) != width:
                 raise lines.wrong(f"numbers in this row: {len(row)}, in the first: {width}")
-            lines.count(width)
             numbers.extend(row)
             if len(first) < SHOWN:
                 first.append(cells)
@@ -97,6 +118,14 @@ def _legend(line: str) -> list[str]:
     return [_bare(words[2])] if len(words) == 3 and (axis or curve) else []
 
 
+def _labelled(line: str) -> tuple[list[str], list[str]]:
+    """Names and numbers of a row such as ``t=0.1 x=0.2`` or ``t = 0.1, x = 0.2``; of others no names."""
+    words = line.replace("=", " ").replace(",", " ").replace(";", " ").split()
+    names, cells = words[::2], words[1::2]
+    whole = len(names) == len(cells) and _numbers(cells) is not None
+    return (names, cells) if whole and not any(_numbers([name]) for name in names) else ([], _cells(line))
+
+
 def of_rows(
     path: Path, values: Floats, first: Sequence[Sequence[str]], names: list[str], header: list[str],
     step: float | None = None,
@@ -111,19 +140,24 @@ def of_rows(
         and np.all(np.diff(values[:, 0]) == 1)
     ):
         header = ["", *header]
-    chosen = names or header
-    counted = [i for i, name in enumerate(chosen[:width]) if counts_steps(name)]
-    if counted and "t" not in kinds(chosen).values():
-        i, values, chosen = counted[0], values.copy(), [*chosen]
-        values[:, i], chosen[i] = times(path, values[:, i], step), "t"
+    columns = named(path, values, names or header)
+    chosen = [*columns]
+    counted = [i for i, name in enumerate(chosen) if counts_steps(name)]
+    if counted and "t" not in kinds(chosen).values() and "q" in kinds(chosen).values():
+        i = counted[0]
+        chosen[i] = "t"
+        columns = {**columns, "t": times(path, values[:, i], step)}
     meant = kinds(chosen)
-    of = {what: [i for i, name in enumerate(chosen[:width]) if meant.get(name) == what] for what in "qpv"}
-    states = split(path, named(path, values, chosen), roundoff(first, [*of["q"], *of["p"], *of["v"]]))
+    of = {what: [i for i, name in enumerate(chosen) if meant.get(name) == what] for what in "qpv"}
+    states = split(path, columns, roundoff(first, [*of["q"], *of["p"], *of["v"]]), step)
     return replace(states, fixed=fixed(first, of["q"], of["p"] or of["v"]))
 
 
 def _cells(line: str) -> list[str]:
     text = line.strip(" ").lstrip("#%!/").strip(" ")
+    if text[:1] == "[" and not {"[", "]"} & {*(row := text.strip("[] "))}:
+        # as NumPy prints a row
+        text = row
     if ";" in text or "\t" in text:
         # there a comma stands for a decimal point
         parts = [re.sub(r"^([+-]?\d*),(\d+)(?![\d.,])", r"\1.\2", _bare(x)) for x in re.split(r"[;\t]", text)]
@@ -156,92 +190,3 @@ def _numbers(cells: Iterable[str]) -> list[float] | None:
         return [number(cell) for cell in cells]
     except ValueError:
         return None
-
-
-def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
-    """Half a unit of the last digit, relative to the largest number, of the column with the fewest digits.
-
-    That of a double from 16 digits on, or 17 where many doubles would need them; and of single precision at
-    least where all numbers equal single ones to their digits, or are the shortest text of such.  A column
-    that is constant, or 0, does not count.
-    """
-    found = 2.0**-53
-    for i in columns:
-        cells = {row[i] for row in rows[:SHOWN]}
-        x, digits = np.array([*map(number, cells)]), max(map(_digits, cells))
-        size = np.abs(x[x != 0])
-        long = np.sum(np.maximum(1 - np.spacing(size) / 10.0 ** (np.floor(np.log10(size)) - 15), 0))
-        if len(cells) > 1 and 0 < digits < 16 + (long > FEWEST_LONG):
-            half, many = 0.5 * 10.0 ** (1 - digits), len(cells) >= FEWEST_CELLS
-            with np.errstate(over="ignore"):
-                near = x.astype(np.float32)
-                short = np.array([float(str(y)) for y in near]) == x
-                single = many and np.all((np.abs(near - x) <= half * np.abs(x)) | short)
-            found = max(found, half, 2.0**-24 if single else 0.0)
-    return found
-
-
-def as_written(states: States) -> States:
-    """States with the digits that their numbers show, as of doubles that were rounded before they are stored;
-    those of a format that states its own keep them."""
-    if states.roundoff > 2.0**-53 or states.fixed:
-        return states
-    numbers = np.hstack([x[:SHOWN] for x in (states.q, states.p, states.v) if x is not None])
-    width, of_q = numbers.shape[1], states.q.shape[1]
-
-    def shortest(x: Floats) -> list[list[str]]:
-        return [[np.format_float_positional(y, trim="0") for y in row] for row in x]
-
-    if len(numbers) < FEWEST_CELLS or roundoff(shortest(numbers[:FEWEST_CELLS]), range(width)) == 2.0**-53:
-        return states
-    rows = shortest(numbers)
-    known = roundoff(rows, range(width)), fixed(rows, range(of_q), range(of_q, width))
-    return replace(states, roundoff=known[0], fixed=known[1]) if known[0] > 2.0**-53 else states
-
-
-def fixed(rows: Sequence[Sequence[str]], q: Iterable[int], v: Iterable[int]) -> Fixed | None:
-    """How columns of positions and of momenta or velocities are rounded to decimals; None where none is.
-
-    The numbers of the largest decade have as many decimals as any, and few digits, or fewer of them the
-    smaller they are.  A column that is constant has fixed decimals where others have as many.
-    """
-    halves, known, constant, coarse = [0.0, 0.0], set[int](), list[tuple[int, int]](), list[int]()
-    single = True
-    for part, i in [(0, i) for i in q] + [(1, i) for i in v]:
-        cells = {row[i] for row in rows[:SHOWN]}
-        x = np.array([*map(number, cells)])
-        places = np.array([len(cell.partition(".")[2]) for cell in cells])
-        digits, width = (np.array([*map(of, cells)]) for of in (_digits, len))
-        most, whole = int(np.max(places)), width == np.max(width)
-        if np.mean(whole) >= AS_WIDE and np.max(digits) < 16 and np.ptp(digits[whole]) > 0:
-            # cut off behind so many letters, a minus among them
-            places = np.where(whole, np.min(places[whole]), places)
-            most = int(np.max(places))
-        with np.errstate(divide="ignore"):
-            decade = np.floor(np.log10(np.abs(x)))
-        plain = not any(re.search(r"[eEdD]|\d[+-]", cell) for cell in cells)
-        lossy = np.max(digits) < 16 or (np.min(places) == most and np.any((digits > 0) & (digits < 15)))
-        half = 0.5 * 10.0**-most
-        with np.errstate(over="ignore"):
-            rest = np.abs(np.float32(x) - x)
-        if np.ptp(x) == 0:
-            constant.append((part, most))
-        elif plain and lossy and np.max(places[decade == np.max(decade)]) == most:
-            halves[part] = max(halves[part], half)
-            known.add(most)
-            single &= bool(np.all(rest <= half))
-            if len(cells) < FEWEST_CELLS or np.ptp(places):
-                # numbers of one decade without their last zeros may be of as many digits
-                coarse += [i] if np.ptp(digits[places == most]) == 0 else []
-        else:
-            coarse.append(i)
-            single &= roundoff(rows, [i]) > 2.0**-53 or not np.any(rest)
-    for part, most in constant:
-        if most in known:
-            halves[part] = max(halves[part], 0.5 * 10.0**-most)
-    beside = max(roundoff(rows, coarse), 2.0**-24 if single else 0.0)
-    return Fixed(halves[0], halves[1], beside) if known else None
-
-
-def _digits(cell: str) -> int:
-    return len(re.sub(r"([eEdD]|(?<=.)[+-]).*$", "", cell).lstrip("+-").replace(".", "").lstrip("0"))

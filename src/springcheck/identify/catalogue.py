@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.identify.rows import HALF, ONE, Formula, Row, flow, same, stability
+from springcheck.identify.rows import HALF, ONE, Formula, Row, flow, stability
+from springcheck.identify.tables import same
 from springcheck.schemes import SCHEMES, Scheme, matrix, roundings
 from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.text.wording import either

@@ -52,10 +52,6 @@ def of_stiffness(seen: Seen, x: Joint) -> str:
     return ", or ".join(dict.fromkeys(text for value, text in rows if abs(ratio / value - 1) < room))
 
 
-BY_CHANCE = (6, 7, 9)
-"""Rows of `of_velocities` whose factors may be equal by chance."""
-
-
 def of_velocities(seen: Seen, x: Joint) -> str:
     """What a scale of the velocities means, recorded over true ones, "" where nothing."""
     part, record = x.parts[0], seen.record
@@ -63,30 +59,34 @@ def of_velocities(seen: Seen, x: Joint) -> str:
     m = float(record.mass[seen.moving[0]]) if record.mass is not None else math.nan
     h = abs(float(record.interval)) / x.stride
     room = 1e-6 + 6 * (part.scale_error + part.a_error / abs(part.a)) + record.jitter
-    free = math.isnan(stiffer)
 
-    def near(a: float, b: float) -> bool:
-        return abs(a / b - 1) <= room
+    def near(size: float, stiffness: float, *, stated: bool = False) -> bool:
+        """Whether scale and stiffness are these; any where none is stated, but for `stated`."""
+        other = not stated if math.isnan(stiffer) else abs(stiffer / stiffness - 1) <= room
+        return abs(scale / size - 1) <= room and other
 
     steps = f"times are {scale:.6g} times what was stepped: the step taken is {1 / scale:.6g} times theirs"
     of_time = meaning(scale, room)
+    # of a step that is a power of ten, its powers are factors of a unit by chance
     rows = (
-        (near(scale, 1 / m) and (free or near(stiffer, m)),
-         "the mass is left out where the position moves: dq/dt = p"),
-        (near(scale, 1 / m) and (free or near(stiffer, 1)), "the momentum is treated as a velocity"),
-        (near(scale, m) and (free or near(stiffer, 1)),
-         "velocities are momenta: they are multiplied by the mass"),
-        (near(scale, m) and not free and near(stiffer, 1 / m), "the mass divides twice"),
-        (near(scale, h * h),
-         f"velocities would have to be {h**-2:.6g} times as large: the position moves by v / h, not by h v"),
-        (near(scale, 1 / h**2), "a factor h**2: the step enters twice"),
-        (near(scale, h), "velocities are divided by 1/h: they are displacements"),
-        (near(scale, 1 / h), "the position moves by v, not by h v: divided by the step"),
-        (not free and abs(scale - 1) > 1e-2 and near(stiffer, scale**-2),
-         steps + (f" ({of_time})" if of_time else "")),
-        (bool(of_time), f"velocities are {scale:.6g} times what they should be: {of_time}"),
+        (near(1 / m, m), "the mass is left out where the position moves: dq/dt = p", False),
+        (near(1 / m, 1), "the momentum is treated as a velocity", False),
+        (near(m, 1), "velocities are momenta: they are multiplied by the mass", False),
+        (near(m, 1 / m, stated=True), "the mass divides twice", False),
+        (near(h**2, h**-4, stated=True),
+         "position and momentum move by v / h and F / h, not by h v and h F: divided by the step", False),
+        (near(h**2, h**-2), "the position moves by v / h, not by h v: divided by the step", False),
+        (near(h, h**-2, stated=True),
+         "position and momentum move by v and F, not by h v and h F: the step is left out", False),
+        (near(h, 1 / h, stated=True), "the position moves by v, not by h v: the step is left out", False),
+        (near(1 / h, h, stated=True), "the position moves by h**2 v: the step enters twice", False),
+        (near(h, 1), "velocities are multiplied by the step: they are displacements", True),
+        (near(1 / h, 1), "velocities are divided by the step", True),
+        (near(scale, scale**-2, stated=True) and abs(scale - 1) > 1e-2,
+         steps + (f" ({of_time})" if of_time else ""), False),
+        (bool(of_time), f"velocities are {scale:.6g} times what they should be: {of_time}", True),
     )  # fmt: skip
-    found = [(i, text) for i, (is_so, text) in enumerate(rows) if is_so]
-    # a step that happens to be a power of ten is one of two causes
-    either = [text for i, text in found if i in BY_CHANCE]
-    return "; or ".join(either) if found and found[0][0] in BY_CHANCE else found[0][1] if found else ""
+    found = [(text, by_chance) for is_so, text, by_chance in rows if is_so]
+    if found and found[0][1]:
+        return "; or ".join(text for text, by_chance in found if by_chance)
+    return found[0][0] if found else ""

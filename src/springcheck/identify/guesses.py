@@ -1,26 +1,31 @@
-"""First guesses of the free numbers of a row: what its trace and determinant ask for."""
+"""First guesses of the free numbers of rows: what trace and determinant of a map ask for."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from springcheck.identify.measure import Map
-from springcheck.identify.rows import Row, bend_of, pieces
+from springcheck.identify.tables import Table, bend_of
 from springcheck.physics.arrays import Floats
 
 FEW = 13
 """Strides from here on are tried without whole turns between frames."""
 
+STRONG, FOLD, FOLD_DAMPED = 0.02, 0.02, 0.2
+"""Loss from which a friction is strong, and how far beyond an extremum of its curve a row is tried."""
 
-def _roots(found: Map, strides: Iterable[int], exact: bool) -> list[tuple[int, int, float, float]]:
+ALIKE = 0.05
+"""Relative difference of the numbers of two guesses that are tried as one."""
+
+
+def _roots(found: Map, strides: Sequence[int], exact: bool) -> list[tuple[int, int, float, float]]:
     """Every possible step: number in a frame, whole turns between frames, 2 - trace/sqrt(det), log det; the
     exact solution has one step to a frame, and the phase in place of the third."""
-    b = found.b[None]
-    bend, loss = (float(x[0]) for x in bend_of(b))
+    bend, loss = (float(x[0]) for x in bend_of(found.b.reshape(4, 1)))
     det = float(found.b[0, 0] * found.b[1, 1] - found.b[0, 1] * found.b[1, 0])
     out: list[tuple[int, int, float, float]] = []
     if det > 0 and 0 < bend < 4:
@@ -46,39 +51,66 @@ def _roots(found: Map, strides: Iterable[int], exact: bool) -> list[tuple[int, i
     return out
 
 
-def guesses(row: Row, found: Map, strides: Iterable[int]) -> Floats:
-    """Rows (stride, turns, a, g) of first guesses."""
-    strides = list(strides)
-    if row.free == "share":
-        return np.array([_held(*x) for x in _roots(found, strides, False)]).reshape(-1, 4)
-    if row.formula is not None and row.scheme == "exact" and not row.view:
-        return np.array([_exact(*x, damped=row.damped) for x in _roots(found, strides, True)]).reshape(-1, 4)
+def guesses(table: Table, found: Map, strides: Sequence[int]) -> tuple[Any, Floats]:
+    """First guesses: the row (c,) of each, and (stride, turns, a, g), (c, 4)."""
     every = np.array(_roots(found, strides, False)).reshape(-1, 4)
-    target, loss = every[:, 2], every[:, 3]
+    rows: list[Any] = []
     out: list[Any] = []
-    for parameter in row.start if row.free not in ("", "friction") else (0.0,):
-        i, a, lost = _crossed(row, parameter, target, FOLD_DAMPED if row.damped else FOLD)
-        g = np.full(len(a), parameter)
-        if row.damped:
-            g = lost - loss[i]
-            a = a + g * g / 4
-        if not row.free:
-            least = max(min(1.0, math.exp(float(np.min(loss * every[:, 0], initial=0.0)))), 1e-6)
-            error = math.sqrt(max(float(np.max(np.diag(found.cov))), 0.0))
-            keep = np.abs(lost - loss[i]) < 3e-3 + 0.02 * np.abs(loss[i]) + 30 * error / least
-            i, a, g = i[keep], a[keep], g[keep]
-        out.append(np.column_stack([every[i, :2], a, g]))
-    if row.damped and np.any(np.abs(loss) > STRONG):
-        # of a strong friction the exact solution is nearer than the scheme without it
+    for r, row in enumerate(table.rows):
+        own = []
+        if row.free == "share":
+            own = [_held(*x) for x in every.tolist()]
+        elif row.formula is not None and row.scheme == "exact" and not row.view:
+            own = [_exact(*x, damped=row.damped) for x in _roots(found, strides, True)]
+        rows.append(np.full(len(own), r))
+        out.append(np.array(own, float).reshape(-1, 4))
+    target, loss = every[:, 2], every[:, 3]
+    special = [r for r, row in enumerate(table.rows) if row.free == "share" or _is_flow(row)]
+    usual = np.ones(len(table.rows), bool)
+    usual[special] = False
+    if len(every) and np.any(usual):
+        r, g, t, a, lost = table.curves.crossed(target, np.where(table.damped, FOLD_DAMPED, FOLD))
+        tiny = np.flatnonzero(np.abs(target) < 1e-9)
+        if len(tiny):
+            each = np.repeat(np.flatnonzero(usual), len(tiny))
+            more = np.tile(tiny, len(each) // len(tiny))
+            r, t, a = np.append(r, each), np.append(t, more), np.append(a, target[more])
+            g, lost = np.append(g, np.zeros(len(each))), np.append(lost, np.zeros(len(each)))
+        damped = table.damped[r]
+        g = np.where(damped, lost - loss[t], g)
+        a = np.where(damped, a + g * g / 4, a)
+        least = max(min(1.0, math.exp(float(np.min(loss * every[:, 0], initial=0.0)))), 1e-6)
+        error = math.sqrt(max(float(np.max(np.diag(found.cov))), 0.0))
+        near = np.abs(lost - loss[t]) < 3e-3 + 0.02 * np.abs(loss[t]) + 30 * error / least
+        keep = usual[r] & (near | table.free[r])
+        rows.append(r[keep])
+        out.append(np.column_stack([every[t, :2], a, g])[keep])
+        if np.any(np.abs(loss) > STRONG):
+            # of a strong friction the exact solution is nearer than the scheme without it
+            with np.errstate(all="ignore"):
+                phase = 2 * np.arcsin(np.sqrt(target / 4))
+            ok = np.isfinite(phase)
+            strong = np.column_stack([every[:, :2], phase**2 + loss**2 / 4, -loss])[ok]
+            each = np.flatnonzero(table.damped & usual)
+            rows.append(np.repeat(each, len(strong)))
+            out.append(np.tile(strong, (len(each), 1)))
+    r, got = np.concatenate(rows), np.concatenate(out)
+    return _unlike(r, got)
+
+
+def _unlike(r: Any, got: Floats) -> tuple[Any, Floats]:
+    """One of guesses that lie so near each other that they lead to one solution."""
+    key = (r * 128 + got[:, 0].astype(int)) * 64 + got[:, 1].astype(int)
+    for x in got[:, 2:].T:
         with np.errstate(all="ignore"):
-            phase = 2 * np.arcsin(np.sqrt(target / 4))
-        ok = np.isfinite(phase)
-        out.append(np.column_stack([every[:, :2], phase**2 + loss**2 / 4, -loss])[ok])
-    return np.concatenate(out)
+            size = np.clip(np.nan_to_num(np.rint(np.log(np.abs(x)) / ALIKE), neginf=-999), -999, 999)
+        key = key * 4096 + 2048 + np.where(x < 0, -1, 1) * (1000 + size).astype(int)
+    first = np.sort(np.unique(key, return_index=True)[1])
+    return r[first], got[first]
 
 
-STRONG, FOLD, FOLD_DAMPED = 0.02, 0.02, 0.2
-"""Loss from which a friction is strong, and how far beyond an extremum of its curve a row is tried."""
+def _is_flow(row: Any) -> bool:
+    return row.formula is not None and row.scheme == "exact" and not row.view
 
 
 def _held(s: int, n: int, bend: float, loss: float) -> tuple[float, ...]:
@@ -90,25 +122,3 @@ def _held(s: int, n: int, bend: float, loss: float) -> tuple[float, ...]:
 def _exact(s: int, n: int, phase: float, loss: float, *, damped: bool) -> tuple[float, ...]:
     g = max(-loss, 0.0) if damped else 0.0
     return s, n, math.copysign(phase**2, phase) + g * g / 4, g
-
-
-def _crossed(row: Row, parameter: float, target: Floats, fold: float) -> tuple[Any, Floats, Floats]:
-    """Where the curve of a row takes each of these values, or nearly does: index of the value, a, log det."""
-    which, at, lost = [], [], []
-    for piece in pieces(row, parameter):
-        low, high = piece.bend[0], piece.bend[-1]
-        inside = (target >= low - fold * abs(low)) & (target <= high + fold * abs(high))
-        i = np.flatnonzero(inside)
-        if len(i):
-            which.append(i)
-            at.append(np.interp(target[i], piece.bend, piece.a))
-            lost.append(np.interp(target[i], piece.bend, piece.loss))
-        for end, inner in ((0, 1), (-1, -2)):
-            # near an extremum, which the curve may take on either side of it
-            near = np.flatnonzero(np.abs(target - piece.bend[end]) <= fold * abs(piece.bend[end]))
-            which.append(near)
-            at.append(np.full(len(near), piece.a[inner]))
-            lost.append(np.full(len(near), piece.loss[inner]))
-    tiny = np.flatnonzero(np.abs(target) < 1e-9)
-    which, at, lost = [*which, tiny], [*at, target[tiny]], [*lost, 0 * target[tiny]]
-    return np.concatenate(which), np.concatenate(at), np.concatenate(lost)

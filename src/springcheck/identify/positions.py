@@ -13,7 +13,7 @@ from springcheck.identify.catalogue import FRICTION, PLAIN, titles
 from springcheck.identify.compare import Freedom, Joint, Match, compare
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.identify.rows import Row, power, unit
+from springcheck.identify.rows import Row
 from springcheck.identify.say import answer
 from springcheck.identify.search import FEW, explained
 from springcheck.identify.seeing import see
@@ -31,12 +31,7 @@ ALONE = (
 @cache
 def _shown(row: Row, steps: int) -> Row:
     """The row of this many steps whose velocities are the last displacements over the interval."""
-
-    def entries(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
-        m = power(unit(row, a / steps**2, g / steps), np.full(len(a), steps))
-        return m[:, 0, 0], m[:, 0, 1] / steps, m[:, 1, 0] * steps, m[:, 1, 1]
-
-    return replace(row, view="earlier", inner=replace(row, formula=entries, stages=(), over=()))
+    return replace(row, view="earlier", inner=row, steps=steps)
 
 
 def identify_positions(

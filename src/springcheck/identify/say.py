@@ -13,8 +13,8 @@ from springcheck.identify import factors
 from springcheck.identify.catalogue import FAULTS, HELD, OLD_FORCE, aliases, capital, title, titles
 from springcheck.identify.compare import Joint
 from springcheck.identify.result import UNTOLD, Candidate, Explanation, Identification, nothing
-from springcheck.identify.rows import same
 from springcheck.identify.search import FEW, Found, Round, Seen
+from springcheck.identify.tables import same
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, kind_of_map
 from springcheck.schemes.elsewhere import ELSEWHERE
 

@@ -14,8 +14,8 @@ from springcheck.identify.catalogue import FAULTS, of_scheme, title
 from springcheck.identify.pair import Timeless, on_a_pair, returned
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
-from springcheck.identify.rows import same
 from springcheck.identify.steps import takers
+from springcheck.identify.tables import same
 from springcheck.identify.unknown import MAP_OF, ONE_MAP
 from springcheck.physics.arrays import Floats
 from springcheck.physics.exact import true_motion

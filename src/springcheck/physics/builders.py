@@ -34,14 +34,23 @@ def spring(
     fast: bool = False,
     **rest: Any,
 ) -> Scene:
-    """A mass on a spring, or many side by side: numbers, or arrays (n,) of them.
-
-    Masses m [M] at q [L] with momenta p [M L/T], on springs of stiffness k [M/T2] that rest at `at` [L], with
-    friction -c p/m where c [M/T] is given; `fast` as in `WallSpring`.  The rest are
-    fields of `Scene`.  Raises SceneError.
+    """A mass on a spring, or several uncoupled ones.
 
     >>> spring(m=2.0, k=[1.0, 4.0], p=[1.0, 0.5]).n
     2
+
+    Parameters
+    ----------
+    m, k, q, p, at, c
+        Mass [M], stiffness [M/T2], initial position [L], initial momentum [M L/T], rest position [L] and
+        friction coefficient of a force -c p/m [M/T]: numbers, or arrays (n,).
+    step, steps, fast, **rest
+        Time step [T], number of steps, whether r-RESPA takes small steps here; further fields of `Scene`.
+
+    Raises
+    ------
+    SceneError
+        A value that is not accepted, or arrays that do not broadcast together.
     """
     m, k, q, p, at, friction = _together("spring", m=m, k=k, q=q, p=p, at=at, c=0.0 if c is None else c)
     index = np.arange(len(m))
@@ -65,11 +74,29 @@ def chain(
     steps: int = 200,
     **rest: Any,
 ) -> Scene:
-    """Masses in a row between two walls, neighbours joined by springs; positions count from the rest of each.
+    """Masses in a row between two walls, neighbours joined by springs.
 
-    m [M] is one number or (masses,), k [M/T2] one number or (masses + 1,), from wall to wall.  The start is
-    q [L] and p [M L/T], plus standing waves given as (mode, amplitude), mode 1 the slowest; a chain with
-    neither swings in mode 1 with amplitude 1.  The rest are fields of `Scene`.  Raises SceneError.
+    >>> chain(3, waves=[(1, 0.5)]).q.round(3)
+    array([0.354, 0.5  , 0.354])
+
+    Parameters
+    ----------
+    masses
+        Number of masses.
+    m, k
+        Masses [M], one number or (masses,), and stiffnesses [M/T2], one or (masses + 1,) from wall to wall.
+    waves
+        Standing waves added to q, each (mode, amplitude [L]); mode 1 is the slowest.  Without waves, q and p
+        the chain starts in mode 1 with amplitude 1.
+    q, p
+        Initial displacements from rest [L] and momenta [M L/T].
+    step, steps, **rest
+        As in `spring`.
+
+    Raises
+    ------
+    SceneError
+        A value that is not accepted.
     """
     if masses < 1:
         raise SceneError(f"masses = {masses}: a whole number >= 1 is needed")

@@ -256,11 +256,14 @@ T = TypeVar("T", bound=type[Term])
 
 
 def register(term: T) -> T:
-    """Class decorator that registers a term for scene files by its key.
+    """Class decorator that registers a term for scene files by its key; data/README.md has examples.
 
-    Raises:
-        TypeError: the class lacks a part, or its key is taken.
-        ValueError: the functions of its law are inconsistent (see `termcheck`).
+    Raises
+    ------
+    TypeError
+        The class lacks a part, or its key is taken.
+    ValueError
+        The functions of its law are inconsistent, as those of a wrong derivative.
     """
     taken = _KNOWN.get(term.key)
     if taken is not None and (taken.__module__, taken.__qualname__) != (term.__module__, term.__qualname__):

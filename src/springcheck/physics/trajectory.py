@@ -44,7 +44,7 @@ class Timing:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trajectory:
-    """Recorded states of one run: row i of q and p belongs to t[i]; row 0 is the start."""
+    """Recorded states of one run: t (f,) [T], q (f, n) [L] and p (f, n) [M L/T]; row 0 is at the start."""
 
     label: str
     scheme: str
@@ -84,12 +84,27 @@ class Trajectory:
         label: str = "data",
         every: float = 1,
     ) -> Trajectory:
-        """A trajectory from arrays: times t (f,) [T], q [L], and p [M L/T] or v [L/T], (f,) or (f, n).
+        """Make a trajectory from arrays of any program.
 
-        `every` is the number of steps between frames, `mass` (n,) or one for all [M] converts v to p; a
-        `scene` gives masses, step, `every`, the energies of these states, and the reference for `judge` and
-        `error`. Arrays of single precision are judged to their digits. SpringcheckError where the arrays are
-        inconsistent.
+        >>> Trajectory.from_arrays([0, 0.1], q=[0, 0.1], v=[1, 0.99], mass=2.0).p[:, 0]
+        array([2.  , 1.98])
+
+        Parameters
+        ----------
+        t, q, p, v
+            Times (f,) [T]; positions [L], and momenta [M L/T] or velocities [L/T], (f,) or (f, n).  Arrays of
+            single precision are judged to their digits.
+        scene
+            Gives masses, step, `every`, the energies of these states, and the exact solution.
+        mass
+            One number or (n,) [M], which converts v to p.
+        scheme, label, every
+            The scheme to judge against, a name, and the number of steps between frames.
+
+        Raises
+        ------
+        SpringcheckError
+            Arrays whose shapes do not fit together, or without momenta and masses.
         """
         if p is None and v is None:
             raise SpringcheckError(f"{label}: momenta p or velocities v= are needed with t and q")
@@ -142,16 +157,13 @@ class Trajectory:
     @property
     def _known(self) -> Scene:
         if self.scene is None:
-            raise SpringcheckError(
-                f"{self.label}: its scene is not known: give it, as from_arrays(t, q, p, scene=...)"
-            )
+            raise SpringcheckError(f"{self.label}: no scene is known; give one: from_arrays(..., scene=...)")
         return self.scene
 
     def error(self) -> Floats:
-        """Distance from the exact solution at each frame (f,), relative to the initial energy norm.
+        """Distance from the exact solution (f,), relative to the initial energy norm.
 
-        SpringcheckError where there is no reference solution.
-        """
+        SpringcheckError for a scene without an exact solution."""
         scene = self._known
         if scene.system.solution is None:
             reason = scene.system.unsolved
@@ -165,13 +177,13 @@ class Trajectory:
 
         steps = np.rint(self.t / self.step)
         if not np.all(np.abs(self.t - steps * self.step) <= 1e-6 * abs(self.step)):
-            raise SpringcheckError(f"{self.label}: its times are no whole steps of {self.step:g}")
+            raise SpringcheckError(f"{self.label}: times are not multiples of the step {self.step:g}")
         return exact.true_motion(scene, steps.astype(np.int64), self.step)
 
     def of_particle(self, particle: int) -> tuple[Floats, Floats]:
         """Its positions and momenta, (f,) each.  SpringcheckError where none has this number."""
         if particle not in range(-(n := self.q.shape[1]), n):
-            raise SpringcheckError(f"{self.label}: particle = {particle}: 0 to {n - 1} are here")
+            raise SpringcheckError(f"{self.label}: particle = {particle}: one from 0 to {n - 1} is needed")
         return self.q[:, particle], self.p[:, particle]
 
     def at(self, rows: slice) -> Trajectory:
@@ -337,10 +349,7 @@ NOT_KNOWN = Limits()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """One number against one bound.  `passed` is None where the check does not apply.
-
-    Value and bound are finite numbers wherever a check applies, and NaN where it does not.
-    """
+    """One number and its bound.  Where the check does not apply, `passed` is None and both are NaN."""
 
     method: str
     check: str
@@ -351,7 +360,7 @@ class Verdict:
     why: str
     """The bound's reason, or why the check does not apply."""
     sees: Limits = NOT_KNOWN
-    """Smallest fault that the check would have detected in this run."""
+    """Detection limits: the smallest errors that the check would have reported in this run."""
     statistic: Any = field(default=None, compare=False, repr=False)
     """Of a random verdict the statistic (`bath.evidence`) where it adds up over pieces of a run; it is in no
     document and no pickle."""
@@ -366,7 +375,7 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """The reason, and the smallest faults that the check would have detected."""
+        """The reason, and the detection limits."""
         # what is identified is known to the digits of the states
         counted = self.bound == 0 and self.check != "identified"
         exact = "any other value would fail" if self.passed and counted else ""

@@ -1,14 +1,13 @@
-"""Guarded access to an HDF5 file of unknown origin: every object is validated before any of it is read.
+"""Reading of HDF5: what lies in the file itself, as plain values.
 
-Only what lies in the file itself is read: external storage, external and soft links and views of other files
-are refused, and so are filters that would load a library.  Sizes, counts, depths and lengths are bounded.
+External storage, external and soft links and views of other files are refused, and so are filters that would
+load a library.  How much is read is bounded by the trial that comes first (see `apart`).
 """
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -17,7 +16,6 @@ import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.physics.scenefile import LONGEST_TEXT as LONGEST_SCENE
 from springcheck.store import files
 
 Scalar: TypeAlias = str | float | int | bool
@@ -26,17 +24,9 @@ MOST_MEMBERS = 2_000
 """Members of a group: runs or tables of one file.  Ours have tens; every command slows down with them."""
 LONGEST_NAME = 200
 """Characters of a name."""
-LONGEST_TEXT = LONGEST_SCENE
-"""Bytes of all texts of one dataset, and of all attributes of one object."""
-LONGEST_DOCUMENT = 1 << 24
-"""Bytes of a JSON document: parsed into Python objects it takes some twenty times as much memory."""
-LARGEST_TABLE = 1 << 28
-"""Bytes of the numbers of a table."""
-MOST_DIMENSIONS = 4
 EXPANSION = 1100
 """Ratio of sizes beyond what deflate can reach (1032): an array that claims more is damaged."""
-
-_PLAIN = {h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM}
+CONTIGUOUS, CHUNKED, VIRTUAL = h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED, h5py.h5d.VIRTUAL
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, 32000}
 """Built into h5py; 32000 is its LZF."""
 
@@ -75,10 +65,9 @@ def is_name(name: str) -> bool:
 
 
 def members(group: Any) -> list[str]:
-    """Names of what a group links to, the soft and external links left out."""
-    count = group.id.get_num_objs()
-    if count > MOST_MEMBERS:
-        raise refuse(group, f"has {count} members, more than any of ours")
+    """Names of what a group holds, the soft and external links left out."""
+    if group.id.get_num_objs() > MOST_MEMBERS:
+        raise refuse(group, f"has more than {MOST_MEMBERS} members")
     names = list(group)
     if not all(map(is_name, names)):
         raise refuse(group, f"has members whose names are no text, or longer than {LONGEST_NAME} characters")
@@ -94,7 +83,7 @@ def find(group: Any, path: str) -> Any:
     """The group or dataset at a path below a group; None where there is none.  No other file is opened."""
     node = group
     for name in path.strip("/").split("/"):
-        if not isinstance(node, h5py.Group) or not node.id.links.exists(name.encode()):
+        if not is_group(node) or not node.id.links.exists(name.encode()):
             return None
         if not _is_hard(node, name):
             raise refuse(
@@ -105,27 +94,22 @@ def find(group: Any, path: str) -> Any:
 
 
 def walk(
-    group: Any, most: int, deepest: int, into: Callable[[str, Any], bool] = lambda place, node: True
+    group: Any, deepest: int, into: Callable[[str, Any], bool] = lambda place, node: True
 ) -> Iterator[tuple[str, int, Any]]:
     """Yield path, address and object of everything below a group.
 
     A group is visited once.  A dataset is yielded under each of its names, with the object at the first of
-    them alone (later None).  `into(path, object)` decides whether a group is entered.  StoreError where there
-    are more than `most`.
+    them alone (later None).  `into(path, object)` decides whether a group is entered.
     """
-    seen, count = {h5py.h5o.get_info(group.id).addr}, 0
+    seen = {h5py.h5o.get_info(group.id).addr}
 
     def below(node: Any, before: str, depth: int) -> Iterator[tuple[str, int, Any]]:
-        nonlocal count
         for name in members(node):
             place, at = before + name, node.id.links.get_info(name.encode()).u
             child = None if at in seen else node[name]
             if child is None and h5py.h5o.get_info(node.id, name.encode()).type == h5py.h5o.TYPE_GROUP:
                 continue
             seen.add(at)
-            count += 1
-            if count > most:
-                raise refuse(node, "is one of more groups and datasets than can be looked at")
             yield place, at, child
             if is_group(child) and depth < deepest and into(place, child):
                 yield from below(child, f"{place}/", depth + 1)
@@ -147,39 +131,6 @@ def children(file: Any, path: str) -> list[str]:
     return [] if group is None else members(group)
 
 
-def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
-    """The dataset at a path, its storage looked at; `packed` allows chunks, compression and views.
-
-    StoreError where there is none, where its numbers do not lie in the file, or where it claims more
-    than the file holds.
-    """
-    node = find(file, path)
-    if node is None:
-        raise StoreError(f"cannot read {file.file.filename}: {path} is missing")
-    if not isinstance(node, h5py.Dataset) or node.shape is None or node.ndim > MOST_DIMENSIONS:
-        raise refuse(node, "is no dataset of any size")
-    how = storage(node)
-    size, stored = node.file.id.get_filesize(), node.id.get_storage_size()
-    claimed = int(np.prod(node.shape, dtype=object)) * node.dtype.itemsize
-    if how.external:
-        raise refuse(node, "lies outside the file: what other files hold is not read")
-    if (how.layout in (VIRTUAL, CHUNKED) and not packed) or how.filters - _FILTERS:
-        raise refuse(node, "is stored in a way that is not read")
-    if how.layout == VIRTUAL:
-        for name, source in how.views:
-            if name != ".":
-                raise refuse(node, f"shows another file, {name}: what other files hold is not read")
-            # what is missing is shown as the fill value
-            shown = find(node.file, source) and dataset_at(node.file, source, packed=True)
-            if shown is not None and storage(shown).layout == VIRTUAL:
-                raise refuse(node, "shows a view of a view: only plain arrays are read")
-    there = node.id.get_offset() if how.layout == CONTIGUOUS else 0
-    too_much = claimed > EXPANSION * stored if how.layout == CHUNKED else claimed and there is None
-    if how.layout != VIRTUAL and (too_much or stored > size or (there or 0) + stored > size):
-        raise refuse(node, f"claims {claimed} bytes, more than the file holds")
-    return node
-
-
 class Storage(NamedTuple):
     """How a dataset is stored, as plain data.
 
@@ -192,9 +143,6 @@ class Storage(NamedTuple):
     filters: frozenset[int]
     views: tuple[tuple[str, str], ...]
     """File and dataset of each source of a virtual dataset."""
-
-
-CONTIGUOUS, CHUNKED, VIRTUAL = h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED, h5py.h5d.VIRTUAL
 
 
 def storage(node: Any) -> Storage:
@@ -210,25 +158,39 @@ def storage(node: Any) -> Storage:
     )
 
 
-def array(file: Any, path: str, shape: tuple[int, ...], kinds: str = "f") -> Any:
-    """A recorded array: contiguous, of this shape, float64 ("f") or integer ("i")."""
-    node = dataset_at(file, path)
-    if node.shape != shape:
-        raise refuse(node, f"has shape {node.shape}, not {shape}")
-    wanted = {"f": ("<f8",), "i": ("<i4", "<i8")}[kinds]
-    if node.dtype.str not in wanted:
-        raise refuse(node, f"is of type {node.dtype}, not numbers as we write them")
+def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
+    """The dataset at a path; `packed` allows chunks, compression and views.
+
+    StoreError where there is none, where its numbers do not lie in the file, or where it claims more
+    than the file holds.
+    """
+    node = find(file, path)
+    if node is None:
+        raise StoreError(f"cannot read {file.file.filename}: {path} is missing")
+    if not isinstance(node, h5py.Dataset) or node.shape is None:
+        raise refuse(node, "is no dataset of any size")
+    how = storage(node)
+    if how.external:
+        raise refuse(node, "lies outside the file: what other files hold is not read")
+    if (how.layout in (VIRTUAL, CHUNKED) and not packed) or how.filters - _FILTERS:
+        raise refuse(node, "is stored in a way that is not read")
+    if others := [name for name, _ in how.views if name != "."]:
+        raise refuse(node, f"shows another file, {others[0]}: what other files hold is not read")
+    claimed = int(np.prod(node.shape, dtype=object)) * node.dtype.itemsize
+    size, stored = node.file.id.get_filesize(), node.id.get_storage_size()
+    there = node.id.get_offset() if how.layout == CONTIGUOUS else 0
+    too_much = claimed > EXPANSION * stored if how.layout == CHUNKED else claimed and there is None
+    if how.layout != VIRTUAL and (too_much or stored > size or (there or 0) + stored > size):
+        raise refuse(node, f"claims {claimed} bytes, more than the file holds")
     return node
 
 
-def texts(dataset: Any) -> np.ndarray:
-    """Strings of a dataset."""
-    if dataset.ndim > 1:
-        raise refuse(dataset, "is no list of texts")
-    found = np.ravel(dataset.asstr(errors="backslashreplace")[()])
-    if sum(map(len, found)) > LONGEST_TEXT:
-        raise refuse(dataset, "holds more text than any of ours")
-    return np.array([*found, None], dtype=object)[:-1].reshape(dataset.shape)
+def array(file: Any, path: str, shape: tuple[int, ...], kinds: str = "f") -> Any:
+    """A recorded array: contiguous, of this shape, float64 ("f") or integer ("i")."""
+    node = dataset_at(file, path)
+    if node.shape != shape or node.dtype.str not in {"f": ("<f8",), "i": ("<i4", "<i8")}[kinds]:
+        raise refuse(node, f"is {node.dtype} of shape {node.shape}, not numbers of shape {shape}")
+    return node
 
 
 def text(file: Any, path: str) -> str:
@@ -236,31 +198,22 @@ def text(file: Any, path: str) -> str:
     node = dataset_at(file, path)
     if node.shape != () or h5py.check_string_dtype(node.dtype) is None:
         raise refuse(node, "is no text")
-    return str(texts(node)[()])
+    return str(column(node)[()])
 
 
 def json(text: str, kind: Any = Any) -> Any:
-    """Parse a text of a file as JSON. ValueError where it is not JSON, or longer than any text of ours."""
-    if len(text) > LONGEST_DOCUMENT:
-        raise ValueError(f"has {len(text)} characters, more than any of ours")
+    """Parse a text of a file as JSON. ValueError where it is not JSON."""
     try:
         return msgspec.json.decode(text.encode("utf-8", "surrogatepass"), type=kind)
     except (msgspec.MsgspecError, RecursionError) as error:
         raise ValueError(str(error)) from error
 
 
-def columns(group: Any) -> dict[str, Any]:
-    """Datasets of a table by name; StoreError beyond `LARGEST_TABLE` bytes in all."""
-    found = {name: dataset_at(group, name) for name in members(group)}
-    if sum(dataset.size * dataset.dtype.itemsize for dataset in found.values()) > LARGEST_TABLE:
-        raise refuse(group, f"has more than {LARGEST_TABLE >> 20} MiB, more than any table of ours")
-    return found
-
-
 def column(dataset: Any) -> np.ndarray:
     """Values of a table's column: numbers, booleans or strings."""
     if h5py.check_string_dtype(dataset.dtype) is not None:
-        return texts(dataset)
+        found = np.ravel(dataset.asstr(errors="backslashreplace")[()])
+        return np.array([*found, None], dtype=object)[:-1].reshape(dataset.shape)
     if dataset.dtype.kind not in "fiub":
         raise refuse(dataset, f"is of type {dataset.dtype}, no column of ours")
     return np.asarray(dataset[()])
@@ -275,9 +228,6 @@ def attributes(node: Any) -> dict[str, Any]:
     found = {raw.decode("utf-8", "backslashreplace"): _value(node, raw) for raw in names}
     if not all(map(is_name, found)):
         raise refuse(node, "has an attribute whose name is no text, or too long")
-    # however often they refer to the same text
-    if sum(len(value) for value in found.values() if isinstance(value, str)) > LONGEST_TEXT:
-        raise refuse(node, f"has attributes of more than {LONGEST_TEXT >> 20} MiB of text")
     return found
 
 
@@ -286,30 +236,28 @@ def attribute(node: Any, name: str) -> Any:
     return _value(node, name.encode()) if h5py.h5a.exists(node.id, name.encode()) else None
 
 
+_PLAIN = {h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM}
+_TYPES: dict[bytes, tuple[np.dtype, Any]] = {}
+"""NumPy dtype and in-memory HDF5 type of an encoded type, the latter None for types that we never write: a
+file has thousands of attributes of a handful of types, and h5py creates each anew."""
+
+
 def _value(node: Any, name: bytes) -> Any:
     known = h5py.h5a.open(node.id, name)
     of = known.get_type()
     # of references libhdf5 cannot decode the type again
-    kind, memory = _types(of.encode()) if of.get_class() in _PLAIN else (None, None)
-    if known.shape is None or memory is None:
-        return f"<{kind or 'reference'}>"
-    if known.get_storage_size() > LONGEST_TEXT:
-        raise refuse(node, f"has an attribute of more than {LONGEST_TEXT >> 20} MiB")
+    if of.get_class() not in _PLAIN or known.shape is None:
+        return "<reference>" if of.get_class() not in _PLAIN else f"<{of.dtype}>"
+    if (code := of.encode()) not in _TYPES:
+        kind = h5py.h5t.decode(code).dtype
+        plain = kind.kind in "fiubS" or h5py.check_string_dtype(kind) is not None
+        _TYPES[code] = kind, h5py.h5t.py_create(kind) if plain else None
+    kind, memory = _TYPES[code]
+    if memory is None:
+        return f"<{kind}>"
     values = np.empty(known.shape, kind)
     known.read(values, memory)
     return [scalar(value) for value in values.ravel()] if known.shape else scalar(values[()])
-
-
-@lru_cache(maxsize=64)
-def _types(encoded: bytes) -> tuple[np.dtype, Any]:
-    """NumPy dtype and in-memory HDF5 type of an encoded type, the latter None for types that we never write.
-
-    Cached: a file has thousands of attributes of a handful of types, and h5py creates each anew.
-    """
-    kind = h5py.h5t.decode(encoded).dtype
-    if kind.kind not in "fiubSO" or (kind.kind == "O" and h5py.check_string_dtype(kind) is None):
-        return kind, None
-    return kind, h5py.h5t.py_create(kind)
 
 
 def scalar(value: Any) -> Scalar:

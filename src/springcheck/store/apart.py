@@ -11,7 +11,6 @@ import contextlib
 import os
 import subprocess
 import sys
-from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
@@ -26,8 +25,8 @@ MEMORY = 1 << 30
 REFUSED = b"refused "
 """Prefix of a reader's message on a file that it refuses."""
 
-_harmless: set[tuple[int, ...]] = set()
-"""States of the files that this process has written, or whose trial has ended well."""
+_known: dict[tuple[int, ...], str] = {}
+"""Whether this process may open files in the states in which it knows them: "", or why it may not."""
 
 
 class EndedError(Exception):
@@ -37,36 +36,24 @@ class EndedError(Exception):
 def trust(path: Path, module: str) -> None:
     """Return if this process can open a file with libhdf5; raise StoreError otherwise.
 
-    The function `tried` of the module reads all of it in a child process.
+    The function `tried` of the module reads all of it in a child process, once for each state of the file.
     """
     with files.told(path, "read"):
-        if state(path) in _harmless:
-            return
-        tried(path, module)
-
-
-def tried(path: Path, module: str) -> bytes:
-    """What a trial of a file has found.  StoreError where it did not end well."""
-    found, why = _tried(path.absolute(), module, state(path))
-    if why:
-        raise StoreError(why)
-    know(path)
-    return found
-
-
-@lru_cache(maxsize=256)
-def _tried(path: Path, module: str, state: tuple[int, ...]) -> tuple[bytes, str]:
-    try:
-        return read(module, "tried", path), ""
-    except StoreError as error:
-        return b"", str(error)
-    except EndedError as error:
-        return b"", f"cannot read {path}: it is damaged, reading it {error}"
+        now = state(path)
+    if now not in _known:
+        try:
+            _known[now] = read(module, "tried", path.absolute()).decode()
+        except StoreError as error:
+            _known[now] = str(error)
+        except EndedError as error:
+            _known[now] = f"cannot read {path}: it is damaged, reading it {error}"
+    if _known[now]:
+        raise StoreError(_known[now])
 
 
 def know(path: Path) -> None:
     """Remember that a file, as it is now, can be opened."""
-    _harmless.add(state(path))
+    _known[state(path)] = ""
 
 
 def state(path: Path) -> tuple[int, ...]:
@@ -83,9 +70,8 @@ def read(module: str, function: str, path: Path, *words: str) -> bytes:
     # BLAS would take memory for a thread of each core
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     limit = min(LONGEST, LIMIT + path.stat().st_size / SPEED)
-    begin = "from springcheck.store import apart; apart.perform()"
-    limits = (str(int(limit) + 1), str(MEMORY))
-    command = [sys.executable, "-P", "-c", begin, *limits, module, function, str(path), *words]
+    begin = f"from springcheck.store import apart; apart.perform({int(limit) + 1})"
+    command = [sys.executable, "-P", "-c", begin, module, function, str(path), *words]
     try:
         # on a busy machine it waits longer than it works, and work is what is limited
         done = called(command, 6 * limit, most=MEMORY, env={**os.environ, **threads, "PYTHONPATH": paths})
@@ -118,36 +104,31 @@ def heard(answer: bytes) -> bytes:
     return answer
 
 
-def perform() -> None:
-    """Entry point of a child process: apply the limits among its arguments, answer on standard output."""
-    seconds, memory, module, function, path, *words = sys.argv[1:]
+def perform(seconds: int) -> None:
+    """Entry point of a child process: apply the limits, and answer on standard output."""
+    module, function, path, *words = sys.argv[1:]
     out = os.dup(1)
     os.dup2(2, 1)
     import_module(module)
-    _limit(int(seconds), int(memory))
-    found = answer(module, function, Path(path), *words)
+    _limit(seconds)
     with open(out, "wb") as file:
-        file.write(found)
+        file.write(answer(module, function, Path(path), *words))
     # a library that was given a bad file may crash as it is tidied up
     os._exit(0)
 
 
-def _limit(seconds: int, memory: int) -> None:
-    """Limit time and memory of this process [s, B], forbid it to write files, and end it with its parent."""
+def _limit(seconds: int) -> None:
+    """Limit time and memory of this process, forbid it to write files, and end it with its parent."""
     try:
         import resource
     except ImportError:
         # Windows has no such limits; the process that asked waits no longer than its own
         return
-    for what, most in (
-        (resource.RLIMIT_CPU, seconds),
-        (resource.RLIMIT_AS, memory),
-        (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_FSIZE, 0),
-    ):
+    limits = {"CPU": seconds, "AS": MEMORY, "CORE": 0, "FSIZE": 0}
+    for name, most in limits.items():
         # macOS knows no RLIMIT_AS
         with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(what, (most, most))
+            resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (most, most))
     if sys.platform == "linux":
         import ctypes
         import signal

@@ -45,8 +45,20 @@ def check(path: str | Path, *, most: int | None = None) -> list[Damage]:
     return found
 
 
+def is_store(path: Path) -> bool:
+    """Whether an HDF5 file is a store of ours, not one of another program."""
+    if not files.is_marked(path):
+        return False
+    apart.trust(path, parts.TRIAL)
+    with access.for_reading(path) as file:
+        return access.attribute(file, "format") in (layout.FORMAT, *layout.OLDER)
+
+
 def doubts(path: str | Path) -> list[Damage]:
     """Damage of a store whose numbers are about to be shown; none for a file of another program."""
+    path = Path(path)
+    if path.is_file() and not files.is_marked(path):
+        return []
     found = check(path, most=LONGEST_CHECK)
     return [] if any(NO_STORE in finding.what for finding in found) else found
 
@@ -55,14 +67,12 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
     """The same for one file, of which the first findings are given."""
     with files.told(path, "read"), path.open("rb"):
         size = path.stat().st_size
-    found: list[Damage] = []
     try:
         apart.trust(path, parts.TRIAL)
         with access.for_reading(path) as file:
-            found = [*islice(_structure(file, arrays=most is None or size <= most), MOST_FINDINGS)]
+            return [*islice(_structure(file, arrays=most is None or size <= most), MOST_FINDINGS)]
     except StoreError as error:
         return [Damage("/", str(error).removeprefix(f"cannot read {path}: "))]
-    return found
 
 
 def tried(path: Path) -> bytes:
@@ -107,6 +117,6 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
             yield Damage(place, "changed since it was written (sha256)")
     if not arrays:
         yield Damage("/observables", "arrays not checked, they are long: check does it")
-    else:
-        for name in digests.broken(Path(file.filename), extents):
-            yield Damage(name, "its numbers changed since they were written (sha256)")
+        return
+    for name in digests.broken(Path(file.filename), extents):
+        yield Damage(name, "its numbers changed since they were written (sha256)")

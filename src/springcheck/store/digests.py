@@ -19,13 +19,12 @@ from springcheck.store import access, tables
 from springcheck.store.layout import QUANTITIES
 
 NAME = "digests"
-MOST_OBJECTS = 64 * access.MOST_MEMBERS
 DEEPEST = 10
 BLOCK = 1 << 20
 """Bytes that are hashed at a time."""
 HOLES = 64
 """Largest ratio of the bytes that arrays claim to those that their file takes on the disk."""
-_SCALES = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"}
+SCALES = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"}
 """Attributes of dimension scales: addresses in the file, which a copy changes."""
 
 
@@ -79,16 +78,14 @@ def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
     found = {"/": _sha256(file, b"")}
     extents: list[Extent] = []
     known: dict[int, str] = {}
-    for place, at, node in access.walk(file, MOST_OBJECTS, DEEPEST, lambda place, node: place != NAME):
-        if place == NAME:
-            continue
+    for place, at, node in access.walk(file, DEEPEST, lambda place, node: place != NAME):
         # times and steps are one array under many names
-        if at not in known:
+        if at not in known and place != NAME:
             try:
                 known[at] = _of(file, place, file[place] if node is None else node, extents)
             except StoreError as error:
                 known[at] = f"none: {error}"
-        found[f"/{place}"] = known[at]
+        found |= {f"/{place}": known[at]} if at in known else {}
     end = 0
     for one in sorted(extents, key=lambda one: one.offset):
         if one.offset < end:
@@ -105,8 +102,10 @@ def _of(file: Any, place: str, node: Any, extents: list[Extent]) -> str:
     """The digest of an object; a recorded array is also appended to `extents`."""
     if not isinstance(node, h5py.Dataset):
         return _sha256(node, b"")
-    node = access.dataset_at(file, place, packed=True) if node.size and _is_written(node) else node
     how, recorded = access.storage(node), access.attribute(node, "sha256")
+    # of a fill value alone nothing is stored
+    if node.size and (node.id.get_storage_size() or how.layout == access.VIRTUAL):
+        node = access.dataset_at(file, place, packed=True)
     about = f"{node.shape} {node.dtype.str} {how.layout} {how.views}".encode("utf-8", "surrogatepass")
     if isinstance(recorded, str) and how.layout == access.CONTIGUOUS:
         size = node.size * node.dtype.itemsize
@@ -118,13 +117,8 @@ def _of(file: Any, place: str, node: Any, extents: list[Extent]) -> str:
     return _sha256(node, about)
 
 
-def _is_written(node: Any) -> bool:
-    """Whether a dataset has more than a fill value."""
-    return bool(node.id.get_storage_size()) or access.storage(node).layout == access.VIRTUAL
-
-
 def _sha256(node: Any, content: bytes) -> str:
-    known = {name: x for name, x in access.attributes(node).items() if name not in _SCALES}
+    known = {name: x for name, x in access.attributes(node).items() if name not in SCALES}
     return hashlib.sha256(repr(sorted(known.items())).encode("utf-8", "surrogatepass") + content).hexdigest()
 
 

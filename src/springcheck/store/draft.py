@@ -17,7 +17,8 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.store import access, apart, digests, files, layout, records
+from springcheck.physics.scenefile import LONGEST_TEXT
+from springcheck.store import apart, digests, files, layout, records
 from springcheck.store.access import Scalar
 
 BUFFER = 1 << 23
@@ -31,10 +32,10 @@ class Draft:
         """`path` is where the finished part of this run goes; `sequence` is its place in the store."""
         layout.check_label(label)
         self._text = scene.to_toml()
-        if len(self._text) > access.LONGEST_TEXT:
+        if len(self._text) > LONGEST_TEXT:
             raise StoreError(
                 f"{path}: the scene's text has {len(self._text) / 1e6:.0f} MB, and stores hold at most "
-                f"{access.LONGEST_TEXT / 1e6:.0f}: take fewer particles, or join alike ones to a [chain]"
+                f"{LONGEST_TEXT / 1e6:.0f}: take fewer particles, or join alike ones to a [chain]"
             )
         self.path, self.label, self.scene, self.sequence, self.run = path, label, scene, sequence, run
         self.rows = 0

@@ -10,7 +10,6 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.physics.arrays import Integers
 from springcheck.store import access, checking, digests, files, layout, parts, reading
 from springcheck.store.checking import Damage
 
@@ -29,9 +28,8 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
     path, out = Path(path), Path(out)
     if os.path.lexists(out):
         raise StoreError(f"{out} exists: remove it or name another file")
-    folder = out.absolute().parent
-    if not folder.is_dir():
-        raise StoreError(f"cannot write {out}: there is no folder {folder}")
+    if not out.absolute().parent.is_dir():
+        raise StoreError(f"cannot write {out}: there is no folder {out.absolute().parent}")
     if out.suffix != ".h5md":
         raise StoreError(
             f"{out}: the name must end in .h5md, readers go by it; .csv and .npz are written in Python, by "
@@ -47,16 +45,10 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
         known, arrays = reading.run_and_arrays(file, label)
         if known.kind != "particles":
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
-        base, group = f"observables/{label}", f"particles/{label}"
-        if access.group_at(file, group) is None:
+        if access.group_at(file, f"particles/{label}") is None:
             raise StoreError(f"{path} is an exported trajectory already: copy it")
-        places = layout.places_of(known.axes, known.particles)
-        if "velocity" in access.children(file, base):
-            arrays["velocity"] = access.array(file, f"{base}/velocity/value", arrays["p"].shape)
-        arrays["step"] = access.array(file, f"{base}/q/step", (known.frames,), "i")
-        mass = access.array(file, f"{group}/mass", (int(np.max(places)) // 3 + 1,))
         # positions and velocities are written twice, the second time in three dimensions
-        size = 8 * sum(x.size * (1 + (x.ndim == 2)) for x in arrays.values()) + 16 * known.frames
+        size = 8 * sum(x.size * (1 + 3 * (x.ndim == 2)) for x in arrays.values()) + 16 * known.frames
         text = 16 * sum(len(str(value)) for value in known.parameters.values())
         root = {"run": os.urandom(16).hex(), "complete": True, "scene": known.scene,
                 "scene_name": known.scene_name, "units": known.units}  # fmt: skip
@@ -64,16 +56,13 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
             with layout.fresh(made, size + text) as target:
                 layout.begin(target)
                 layout.write_attributes(target, root)
-                layout.write_attributes(target.create_group(f"parameters/{label}"), known.parameters)
-                axis = _observables(file[base], target.create_group(base), arrays)
-                particles = target.create_group("particles/trajectory")
-                if known.units == "reduced":
-                    axis = {**axis, "time": particles.create_dataset("position/time", data=axis["time"][()])}
-                    layout.write_unit(axis["time"], "ps")
-                layout.write_particles(
-                    particles, layout.UNITS[known.kind, known.units], mass[()], axis, "velocity" in arrays,
-                    lambda element, source: _copy_values(arrays[source], element, places),
-                )  # fmt: skip
+                for place in (f"parameters/{label}", f"observables/{label}"):
+                    target.require_group(place.partition("/")[0])
+                    h5py.h5o.copy(file.id, place.encode(), target.id, place.encode())
+                base = target[f"observables/{label}"]
+                base.pop("error", None)
+                _particles(file[f"particles/{label}"], target.create_group("particles/trajectory"), base["q"])
+                target.visititems(_detach)
                 layout.attach_scales(target)
                 extents = digests.write(target)[1]
             for name in digests.broken(made, extents):
@@ -82,35 +71,41 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
     return found
 
 
-def _observables(source: Any, target: Any, arrays: dict[str, Any]) -> dict[str, Any]:
-    """Copy the recorded arrays with their attributes -> time and step, one array each under many names."""
-    layout.write_attributes(target, access.attributes(source))
-    axis: dict[str, Any] = {}
-    for name in [name for name in arrays if name not in ("time", "step")]:
-        element = target.create_group(name)
-        layout.write_attributes(element, access.attributes(source[name]))
-        h5py.h5o.copy(arrays[name].id, b".", element.id, b"value")
-        if axis:
-            element.update(axis)
-            continue
-        for kind in ("time", "step"):
-            h5py.h5o.copy(arrays[kind].id, b".", element.id, kind.encode())
-            axis[kind] = element[kind]
-    for node in [*axis.values(), *(target[name]["value"] for name in target)]:
-        # they lead to the scales of the store
-        for old in {"REFERENCE_LIST", "DIMENSION_LIST", "CLASS", "NAME"} & set(node.attrs):
-            del node.attrs[old]
-    return axis
+def _detach(name: str, node: Any) -> None:
+    """Remove what leads to the dimension scales of the store."""
+    for old in digests.SCALES & set(node.attrs):
+        del node.attrs[old]
 
 
-def _copy_values(source: Any, target: Any, places: Integers) -> Any:
-    """Copy (frames, n) to its places in (frames, particles, 3), in pieces; the rest keeps the fill value."""
-    frames, particles = source.shape[0], int(np.max(places)) // 3 + 1
+def _particles(source: Any, target: Any, axis: Any) -> None:
+    """Copy a particle group, with numbers in the place of views; `axis` has the times and steps."""
+    for name in source:
+        h5py.h5o.copy(source.id, name.encode(), target.id, name.encode())
+    time = source["position/time"]
+    for name in ("position", "velocity", "species"):
+        element = target[name]
+        del element["time"], element["step"]
+        element["step"] = axis["step"]
+        if not time.is_virtual:
+            element["time"] = axis["time"]
+        elif name == "position":
+            element["time"] = time[()]
+            layout.write_attributes(element["time"], access.attributes(time))
+        else:
+            element["time"] = target["position/time"]
+        if name != "species":
+            value = _copied(source[name]["value"], element)
+            layout.write_attributes(value, access.attributes(source[name]["value"]))
+
+
+def _copied(source: Any, element: Any) -> Any:
+    """Copy (frames, particles, 3) in pieces; axes along which nothing moves keep the fill value."""
+    del element["value"]
+    frames, particles, _ = source.shape
     rows = max(1, min(frames, CHUNK // (8 * particles)))
-    shape = (frames, particles, 3)
-    made = target.create_dataset("value", shape, "<f8", chunks=(rows, particles, 1), fillvalue=0.0)
+    made = element.create_dataset("value", source.shape, "<f8", chunks=(rows, particles, 1), fillvalue=0.0)
     for start in range(0, frames, rows):
         part = np.asarray(source[start : start + rows])
-        for columns, of, axis in layout.lines(places):
-            made[start : start + rows, of, axis] = part[:, columns]
+        for axis in np.flatnonzero(part.any(axis=(0, 1))):
+            made[start : start + rows, :, axis] = part[:, :, axis]
     return made

@@ -163,21 +163,27 @@ def put_bytes(content: bytes, path: Path) -> None:
 
 def sync_folder(folder: Path) -> None:
     """Make names in a folder survive a loss of power."""
-    if sys.platform == "win32":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    except OSError as error:
-        if error.errno not in UNSUPPORTED:
-            raise
-    finally:
-        os.close(handle)
+    if sys.platform != "win32":
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        except OSError as error:
+            if error.errno not in UNSUPPORTED:
+                raise
+        finally:
+            os.close(handle)
 
 
 def is_plain(path: Path) -> bool:
     """Whether a path is a file with one name, and no link to another one."""
     return path.is_file() and not path.is_symlink() and path.stat().st_nlink == 1
+
+
+def is_marked(path: Path) -> bool:
+    """Whether a file may be a store: the mark of its format is among its first bytes."""
+    with told(path, "read"), path.open("rb") as file:
+        start = file.read(1 << 20)
+    return start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start
 
 
 class Lock:
@@ -189,16 +195,13 @@ class Lock:
             raise StoreError(f"{path} stands where the lock of a store goes; move it away")
         while True:
             self._file: Any = path.open("ab")
-            try:
-                if not _locked(self._file):
-                    raise StoreError(f"{path.parent} is being written by another process: wait, or stop it")
-                # the last holder may have removed the file between `open` and the lock
-                if path.exists() and os.path.samestat(path.stat(), os.fstat(self._file.fileno())):
-                    return
-            except BaseException:
-                self._file.close()
-                raise
-            self._file.close()
+            if not _locked(self._file):
+                self.release()
+                raise StoreError(f"{path.parent} is being written by another process: wait, or stop it")
+            # the last holder may have removed the file between `open` and the lock
+            if path.exists() and os.path.samestat(path.stat(), os.fstat(self._file.fileno())):
+                return
+            self.release()
 
     def release(self) -> None:
         """Give the lock back; its file stays until the journal is removed."""
@@ -207,15 +210,11 @@ class Lock:
 
 def _locked(file: BinaryIO) -> bool:
     """Whether the lock was granted, or the file system offers none."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
+    try:
+        import fcntl
+    except ImportError:
+        # Windows refuses to move or remove a file that another process has open
         return True
-    import fcntl
 
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -17,6 +17,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
+import msgspec
+
 from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning, plain
 from springcheck.physics.scene import Scene
@@ -45,17 +47,16 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     if path.is_symlink():
         # the link stays, and what it leads to is written
         path = path.resolve()
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise StoreError(f"cannot write {path}: there is no folder {folder}")
-    if path.is_dir():
-        raise StoreError(f"cannot write {path}: it is a folder")
-    if path.exists() and not path.is_file():
+    folder, parts = path.absolute().parent, folder_of(path)
+    for wrong, why in (
+        (not folder.is_dir(), f"there is no folder {folder}"),
+        (path.is_dir(), "it is a folder"),
         # --force would put a file in the place of /dev/null
-        raise StoreError(f"cannot write {path}: it is a device or a pipe, a store is a file")
-    if path.suffix == ".toml":
-        raise StoreError(f"cannot write {path}: a name in .toml is a scene's, not a store's")
-    parts = folder_of(path)
+        (path.exists() and not path.is_file(), "it is a device or a pipe, a store is a file"),
+        (path.suffix == ".toml", "a name in .toml is a scene's, not a store's"),
+    ):
+        if wrong:
+            raise StoreError(f"cannot write {path}: {why}")
     with files.told(path, "write"):
         if not _is_free(parts):
             raise StoreError(f"cannot write {path}: {parts} stands where its journal goes; move it away")
@@ -98,9 +99,7 @@ def _is_mine(entry: Path) -> bool:
 
 def _is_store(path: Path) -> bool:
     """Whether a file is a store of ours, whole or damaged, or empty."""
-    with path.open("rb") as file:
-        start = file.read(1 << 20)
-    return not start or (start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start)
+    return not path.stat().st_size or files.is_marked(path)
 
 
 def _claimed(path: Path, parts: Path, command: str, *, force: bool) -> str:
@@ -126,7 +125,8 @@ def _claimed(path: Path, parts: Path, command: str, *, force: bool) -> str:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     _remove(parts, *_WORK)
     run = os.urandom(16).hex()
-    Claim(run=run, command=command, forced=force).write(parts)
+    claimed = Claim(run=run, command=command, forced=force)
+    files.put_bytes(msgspec.json.encode(claimed), parts / "command")
     files.sync_folder(path.absolute().parent)
     return run
 
@@ -183,7 +183,7 @@ class Journal:
 
     def finished(self) -> dict[str, Path]:
         """Label of each trajectory that is finished and needs no second run -> the part that holds it."""
-        return reading.in_order(Parts.of(self.path, writing=True))
+        return reading.sources(self.path, writing=True)
 
     def draft(self, label: str, scene: Scene) -> Draft:
         """Start to store a trajectory of this scene."""

@@ -22,17 +22,17 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 import springcheck
 from springcheck.errors import StoreError, plain
-from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.arrays import Integers
 from springcheck.physics.scene import Scene
 from springcheck.store import access, files
 
@@ -59,10 +59,7 @@ _NAMES = "q", "p", "energy", "velocity", "time", "mass"
 _MD = dict(zip(_NAMES, ("nm", "u nm ps-1", "kJ mol-1", "nm ps-1", "ps", "u"), strict=True))
 _SI = dict(zip(_NAMES, ("m", "kg m s-1", "J", "m s-1", "s", "kg"), strict=True))
 _BARE = dict.fromkeys(_MD, "1")
-UnitsOf: TypeAlias = Mapping[str, str]
-Axis: TypeAlias = Mapping[str, Any]
-"""The datasets `time` and `step`, which all elements of a trajectory share."""
-UNITS: Mapping[tuple[str, str], UnitsOf] = {
+UNITS = {
     ("particles", "md"): _MD,
     ("particles", "reduced"): _MD,
     ("particles", "si"): _SI,
@@ -227,16 +224,10 @@ def _contiguous(file: Any, column: Column) -> Any:
     return h5py.Dataset(h5py.h5d.create(file.require_group(group).id, name.encode(), kind, space, how))
 
 
-def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column], axis: Axis) -> None:
-    """The particle group of a trajectory: views of its observables."""
-
-    def viewed(element: Any, source: str) -> Any:
-        column = found[source]
-        view = h5py.VirtualLayout((column.shape[0], scene.particles, 3), "<f8")
-        numbers = h5py.VirtualSource(".", column.path, column.shape, "<f8")
-        for columns_, particles, direction in lines(scene.all_places):
-            view[:, particles, direction] = numbers[:, columns_]
-        return element.create_virtual_dataset("value", view, fillvalue=0.0)
+def _particles(
+    file: Any, label: str, scene: Scene, found: Mapping[str, Column], axis: Mapping[str, Any]
+) -> None:
+    """The particle group of a trajectory: views of its observables, at its times and steps."""
 
     group = file.create_group(f"particles/{label}")
     if scene.units == "reduced":
@@ -246,31 +237,28 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
         view[:] = h5py.VirtualSource(".", column.path, column.shape, "<f8")
         axis = {**axis, "time": group.create_group("position").create_virtual_dataset("time", view)}
         write_unit(axis["time"], _MD["time"])
-    units = UNITS.get((scene.kind, scene.units), _BARE)
-    write_particles(group, units, scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
-
-
-def write_particles(
-    group: Any, unit: UnitsOf, mass: Floats, axis: Axis, have_velocity: bool, write: Callable[[Any, str], Any]
-) -> None:
-    """The elements of a particle group.  `write(element, source)` writes the values (frames, particles, 3) of
-    one of the observables and returns them."""
-    frames = len(axis["time"])
-    for name, source in (("position", "q"), ("velocity", "velocity" if have_velocity else "p")):
-        element = group.require_group(name)
-        write_unit(write(element, source), unit["q" if name == "position" else "velocity"])
+    unit = UNITS.get((scene.kind, scene.units), _BARE)
+    rates = "velocity" if "velocity" in found else "p"
+    for name, source, quantity in (("position", "q", "q"), ("velocity", rates, "velocity")):
+        column, element = found[source], group.require_group(name)
+        view = h5py.VirtualLayout((column.shape[0], scene.particles, 3), "<f8")
+        numbers = h5py.VirtualSource(".", column.path, column.shape, "<f8")
+        for columns_, particles, direction in lines(scene.all_places):
+            view[:, particles, direction] = numbers[:, columns_]
+        write_unit(element.create_virtual_dataset("value", view, fillvalue=0.0), unit[quantity])
         _on(element, axis)
-    write_unit(group.create_dataset("mass", data=mass), unit["mass"])
+    write_unit(group.create_dataset("mass", data=scene.masses.astype("<f8")), unit["mass"])
     # no element of the periodic table: a fill value alone, which costs no bytes
-    species = group.create_group("species")
-    species.create_dataset("value", (frames, len(mass)), "<i4", chunks=(min(frames, 4096), 1), fillvalue=0)
+    species, frames = group.create_group("species"), len(axis["time"])
+    size = (frames, scene.particles)
+    species.create_dataset("value", size, "<i4", chunks=(min(frames, 4096), 1), fillvalue=0)
     _on(species, axis)
     box = group.create_group("box")
     box.attrs["dimension"] = 3
     write_attributes(box, {"boundary": ["none"] * 3})
 
 
-def _on(element: Any, axis: Axis) -> None:
+def _on(element: Any, axis: Mapping[str, Any]) -> None:
     element.update({name: one for name, one in axis.items() if name not in element})
 
 
@@ -301,17 +289,6 @@ def axes_of(scene: Scene) -> str:
     of, axis = np.divmod(scene.places, 3)
     each = ["".join("xyz"[a] for a in axis[of == i]) for i in range(scene.particles)]
     return each[0] if len(set(each)) == 1 else ",".join(each)
-
-
-def places_of(axes: str, n: int) -> Integers:
-    """The place, 3 particle + axis, of each of n columns.  StoreError where these are not the axes of n."""
-    each = axes.split(",")
-    if "," not in axes:
-        each *= max(1, n // max(1, len(axes)))
-    found = [3 * i + "xyz".find(axis) for i, own in enumerate(each) for axis in own]
-    if len(found) != n or len(set(found)) < n or not set(axes) <= set("xyz,") or not all(each):
-        raise StoreError(f"axes {axes[:40]!r} are not those of {n} coordinates")
-    return np.array(found)
 
 
 def lines(places: Integers) -> Iterator[tuple[slice, slice, int]]:

@@ -26,10 +26,6 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True):
     command: str
     forced: bool
 
-    def write(self, folder: Path) -> None:
-        """Put it into the journal."""
-        files.put_bytes(msgspec.json.encode(self), folder / "command")
-
 
 def folder_of(path: Path) -> Path:
     """The journal of a store."""

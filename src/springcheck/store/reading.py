@@ -27,17 +27,13 @@ PIECE = 1 << 20
 """Rows of a window by default."""
 
 
-def sources(path: Path) -> dict[str, Path]:
-    """Label of each trajectory -> the file that holds it, in the order in which they were started."""
-    found = Parts.of(path)
-    if not found.everything:
+def sources(path: Path, *, writing: bool = False) -> dict[str, Path]:
+    """Label of each trajectory -> the file that holds it, in the order in which they were started; for their
+    writer the parts of a journal alone."""
+    found = Parts.of(path, writing=writing)
+    if not found.everything and not writing:
         with files.told(path, "read"), path.open("rb"):
             pass
-    return in_order(found)
-
-
-def in_order(found: Parts) -> dict[str, Path]:
-    """Label of each trajectory of these files -> the file that holds it."""
     listed: list[tuple[int, str, Path]] = []
     for part in found.runs:
         with opened(part) as file:
@@ -201,33 +197,31 @@ def tables_of(path: str | Path) -> Mapping[str, Table]:
         return Tables(dict.fromkeys(tables.names(file), Path(path)))
 
 
-def _table(path: str | Path, name: str) -> Table | None:
-    """A table of one file; None where it has none of this name."""
-    with opened(Path(path)) as file:
-        group = access.group_at(file, name)
-        return None if group is None else tables.read(group, name)
-
-
 class Tables(UserDict[str, Any]):
     """Files by the names of the tables that they hold; an item is the table, read from its file."""
 
     def __getitem__(self, name: str) -> Table:
-        found = _table(self.data[name], name)
-        if found is None:
-            raise StoreError(f"{self.data[name]} holds no {name}")
-        return found
+        with opened(Path(self.data[name])) as file:
+            if (group := access.group_at(file, name)) is None:
+                raise StoreError(f"{self.data[name]} holds no {name}")
+            return tables.read(group, name)
+
+
+def _has(path: str | Path, name: str) -> bool:
+    with opened(Path(path)) as file:
+        return access.group_at(file, name) is not None
 
 
 def verdicts(path: str | Path) -> tuple[Verdict, ...]:
     """The verdicts of a store; none where it has none."""
-    found = _table(path, "verdicts")
-    return () if found is None else tables.to_verdicts(found)
+    name = "verdicts"
+    return tables.to_verdicts(Tables({name: path})[name]) if _has(path, name) else ()
 
 
 def comparison(path: str | Path) -> Comparison | None:
     """The matrix of differences between the trajectories of a store."""
-    found = _table(path, "comparison")
-    return None if found is None else tables.to_comparison(found)
+    name = "comparison"
+    return tables.to_comparison(Tables({name: path})[name]) if _has(path, name) else None
 
 
 def document(path: str | Path, name: str) -> str:

@@ -150,22 +150,13 @@ def machine() -> dict[str, Scalar]:
         "machine": platform.machine(),
         "processor": _processor(),
         "cores": os.cpu_count() or 0,
-        "system": _system(),
+        "system": f"{platform.system()} {platform.release()}",
         "host": platform.node(),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "h5py": h5py.__version__,
         "hdf5": h5py.version.hdf5_version,
     }
-
-
-def _system() -> str:
-    """The system as `platform.platform` names it, which on Linux starts a program to ask for the
-    processor."""
-    if platform.system() != "Linux":
-        return platform.platform()
-    libc = "".join(platform.libc_ver())
-    return f"Linux-{platform.release()}-{platform.machine()}-with-{libc}"
 
 
 def _processor() -> str:

@@ -94,7 +94,7 @@ def read(group: Any, name: str) -> Table:
     except ValueError:
         style = {}
     scales = [*_listed(style.get("axes_scale_types")), style.get("signal_scale_type")]
-    columns = access.columns(group)
+    columns = {column: access.dataset_at(group, column) for column in access.members(group)}
     units = {column: access.attributes(dataset).get("unit") for column, dataset in columns.items()}
     return Table(
         name=name,
@@ -118,7 +118,7 @@ def names(file: Any) -> Iterator[str]:
     def into(place: str, node: Any) -> bool:
         return place not in RESERVED and not _is_table(node)
 
-    for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST, into):
+    for place, _, node in access.walk(file, DEEPEST, into):
         if place not in RESERVED and _is_table(node):
             yield place
 

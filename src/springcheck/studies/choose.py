@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -10,6 +11,7 @@ from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
+from springcheck.text.lines import Lines, plain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,6 +20,18 @@ class LeftOut:
 
     method: str
     reason: str
+
+
+def left_out(left: Sequence[LeftOut], word: str = "Left out") -> Lines:
+    """One line for each reason, without the name of the method in it."""
+    reasons: dict[str, list[str]] = {}
+    for one in left:
+        reasons.setdefault(one.reason.removeprefix(f"{one.method}: "), []).append(one.method)
+    said = [
+        plain(f"{word} {', '.join(names)}: {re.sub('^it ', 'each ', why) if len(names) > 1 else why}")
+        for why, names in reasons.items()
+    ]
+    return [plain(), *said] if said else []
 
 
 def sorted_out(

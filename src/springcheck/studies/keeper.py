@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, nullcontext
-from dataclasses import dataclass, replace
-from functools import wraps
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack, get_type_hints
 
 import msgspec
 import numpy as np
@@ -24,17 +23,18 @@ from springcheck.store import Draft, Solution, Table
 from springcheck.studies import team as teams
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut
+from springcheck.studies.study import Studied
 from springcheck.studies.team import ALONE, Team
 
 if TYPE_CHECKING:
     from springcheck.studies.tables import Form
 
 __all__ = [
-    "Draft", "Keeper", "Kept", "Piece", "Solution", "Table", "command", "each", "kept", "origin", "plain",
-    "read", "restoring", "study",
+    "Draft", "Keeper", "Piece", "Solution", "Table", "command", "each", "kept", "origin", "plain", "read",
+    "restored", "study",
 ]  # fmt: skip
 
-T = TypeVar("T")
+R = TypeVar("R", bound=Studied)
 
 open_new, need_space, size = store.open_new, store.need_space, store.size
 need_names = store.need_names
@@ -54,7 +54,7 @@ class Piece:
     """Its name in progress reports."""
     measure: Callable[[], Any]
     form: Form[Any]
-    cost: float = 0.0
+    cost: float = 1.0
     """Estimate of the time that it takes, relative to other pieces."""
 
     @property
@@ -94,52 +94,38 @@ class Keeper:
         table = self._finished.get(form.beginning + key)
         return None if table is None else form.found(table)
 
-    def attribute(self, form: Form[Any], key: str, name: str) -> Any:
-        """An attribute of such a table."""
-        return self._finished[form.beginning + key].attributes[name]
-
-    def keep(self, form: Form[Any], key: str, found: Any, **attributes: Any) -> None:
+    def keep(self, form: Form[Any], key: str, found: Any) -> None:
         """Save a result under its key, replacing an earlier one; from here on it survives a crash."""
-        self.add(form.table(key, found, **attributes))
-
-    def add(self, table: Table) -> None:
-        """Save a table that is no result."""
         if self._journal is not None:
-            self._journal.add(table)
+            self._journal.add(form.table(key, found))
+
+    def say(self, text: str) -> None:
+        """Print a result as soon as it is known, above the progress bar."""
+        if text and (line := getattr(self.progress, "line", None)):
+            line(text)
 
     def results(self, pieces: Sequence[Piece]) -> list[Any]:
         """Results of these pieces, in their order: an earlier call's, or measured and saved."""
-        found = {piece.name: result for piece, result in self.stream(pieces)}
-        return [found[piece.name] for piece in pieces]
-
-    def stream(self, pieces: Sequence[Piece]) -> Iterator[tuple[Piece, Any]]:
-        """Pieces with their results as they finish, those of earlier calls first; none is held in memory."""
-        left = []
-        for piece in pieces:
-            if piece.name in self._finished:
-                self.resumed += 1
-                yield piece, self.finished(piece.form, piece.key)
-            else:
-                left.append(piece)
+        found = {piece.name: self.finished(piece.form, piece.key) for piece in pieces}
+        left = [piece for piece in pieces if found[piece.name] is None]
+        self.resumed += len(pieces) - len(left)
         if self.team.workers > 1:
             # longest pieces first, so that the last one to finish is not waited for long
             left.sort(key=lambda piece: -piece.cost)
-        done = len(pieces) - len(left)
-        self._tell(done, pieces, left[:1])
-        with closing(self.carried_out([piece.measure for piece in left])) as measured:
-            for count, (j, result) in enumerate(measured, 1):
+        whole = sum(piece.cost for piece in pieces)
+        done = whole - sum(piece.cost for piece in left)
+        self._tell(done, whole, left[:1])
+        with closing(self.team.carried_out([piece.measure for piece in left])) as measured:
+            for number, (j, result) in enumerate(measured, 1):
+                found[left[j].name], done = result, done + left[j].cost
                 self.keep(left[j].form, left[j].key, result)
-                self._tell(done + count, pieces, left[count : count + 1])
-                yield left[j], result
+                self.say(left[j].form.line(result))
+                self._tell(done, whole, left[number : number + 1])
+        return [found[piece.name] for piece in pieces]
 
-    def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Index and result of each part, as the team finishes them."""
-        with closing(self.team.carried_out(parts)) as found:
-            yield from found
-
-    def _tell(self, done: int, pieces: Sequence[Piece], following: Sequence[Piece]) -> None:
+    def _tell(self, done: float, whole: float, following: Sequence[Piece]) -> None:
         if self.progress:
-            self.progress(done, len(pieces), *(piece.what for piece in following))
+            self.progress(done, whole, *(piece.what for piece in following))
 
     def commit(self, name: str, document: Mapping[str, Any], scene: Scene | None = None) -> None:
         """Write everything that was saved, and the study's document, into the store."""
@@ -175,59 +161,52 @@ def kept(path: str | Path | None, command: str, **how: Unpack[How]) -> Iterator[
 
 
 def study(
-    name: str, path: str | Path | None, labels: Sequence[Label], measure: Callable[[Keeper], T],
+    name: str, path: str | Path | None, labels: Sequence[Label], measure: Callable[[Keeper], R],
     *options: str, scene: Scene | None = None, **how: Unpack[How],
-) -> T:  # fmt: skip
+) -> R:  # fmt: skip
     """Run the study `measure` of these methods and save it in a store (see `kept`); `options` is all that
     determines its numbers besides the scene."""
     more = options if scene is None else (scene.digest, *options)
     with kept(path, command(name, labels, *more), **how) as keeper:
-        found: Any = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)  # type: ignore[type-var]
-        keeper.commit(name, found.kept_document(), scene)
-    return found  # type: ignore[no-any-return]
+        found = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)
+        keeper.commit(name, _stored(found), scene)
+    return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kept:
-    """A study in a store: its document, and its tables by name."""
-
-    path: Path
-    document: Any
-    tables: Mapping[str, store.Table]
-
-    def found(self, form: Form[Any], key: str) -> Any:
-        """The result of this key.  KeyError where it is missing."""
-        return form.found(self.tables[form.beginning + key])
-
-    def listed(self, form: Form[Any], name: str) -> tuple[Any, ...]:
-        """The results of the methods that the document lists under this name, in its order."""
-        methods = dict.fromkeys(one["method"] for one in self.document.get(name, ()))
-        return tuple(self.found(form, method) for method in methods)
-
-    @property
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The methods that were not measured."""
-        return tuple(LeftOut(**one) for one in self.document["left_out"])
+_NOT_STORED = ("scene", "path", "resumed")
 
 
-def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path], T]]:
-    """Turn a function that builds a study from its `Kept` data into one that reads it from a store.
+def _stored(found: Studied) -> dict[str, Any]:
+    """The document of a result without what its tables hold, and what `restored` reads: the name of its
+    class, its fields, and the names of its tables."""
+    own = {one.name: getattr(found, one.name) for one in fields(found)}
+    tables = {name: form.names(own.pop(name)) for name, form in found.forms.items()}
+    document = {name: x for name, x in found.document().items() if name not in tables}
+    values = {name: plain(x) for name, x in own.items() if name not in _NOT_STORED}
+    return {**document, "kind": type(found).__name__, "fields": values, "tables": tables}
 
-    The latter raises StoreError where the file holds no such study, or a part of it is missing.
+
+def restored(name: str, path: Path, kinds: Mapping[str, type]) -> Studied:
+    """The result of the study `name` in a store, of one of these classes.
+
+    StoreError where the file holds no such study, or a part of it is missing.
     """
-
-    def reader(build: Callable[[Kept], T]) -> Callable[[str | Path], T]:
-        @wraps(build)
-        def stored(path: str | Path) -> T:
-            try:
-                kept = Kept(path=Path(path), document=store.decoded(path, name), tables=store.tables_of(path))
-                return build(kept)
-            except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-                raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
-
-        return stored
-
-    return reader
+    try:
+        known, tables = store.decoded(path, name), store.tables_of(path)
+        kind: Any = kinds[known["kind"]]
+        if not issubclass(kind, Studied):
+            raise TypeError("a class of results")
+        hints = get_type_hints(kind, localns={"Scene": Scene, "LeftOut": LeftOut, "Form": list})
+        values: dict[str, Any] = {
+            field: msgspec.convert(x, hints[field], strict=False) for field, x in known["fields"].items()
+        }
+        for field, form in kind.forms.items():
+            values[field] = tuple(x for table in known["tables"][field] for x in form.listed(tables[table]))
+        scene = stored_scene(path) if "scene" in store.summary(path).root else None
+        found: Studied = kind(scene=scene, path=path, **values)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, msgspec.ValidationError) as error:
+        raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
+    return found
 
 
 def stored_scene(path: Path) -> Scene:

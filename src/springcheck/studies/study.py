@@ -1,32 +1,35 @@
-"""Definition of a study: a folder with its measure, result and charts, and a line in the list.
+"""A study: a folder with its measure and its result, and a line in the list `STUDIES`.
 
-The folder's `__init__` declares the study and imports nothing heavy; its parts are imported on use:
-`measure.perform` and `measure.stored`, whose results say themselves, and `page.banks` where it has charts.
+The folder's `__init__` declares the study and imports nothing heavy.  Its `measure.perform` carries out what
+the command line asks for and returns a result.  A result says its title, its answer, its tables and its
+charts; one printer, one drawer and one reader here serve all of them.
 """
 
 from __future__ import annotations
 
 import gc
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from springcheck.studies.arguments import Argument, Progress
+from springcheck.text.lines import Lines, as_html, as_text, plain
+from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.figures.charts import Bank
+    from springcheck.physics.scene import Scene
     from springcheck.store import Summary
     from springcheck.studies.choose import LeftOut
-    from springcheck.text.lines import Lines
+    from springcheck.studies.tables import Form
 
 
 class StudyResult:
-    """Result of a study, and its forms in Python: a line, the text of the command, a table.
+    """Result of a study, and its forms in Python: a line, the text of the command, a table, figures.
 
     Its class stands in the package whose `STUDY` it belongs to.
     """
@@ -48,14 +51,14 @@ class StudyResult:
         """The whole report as text, with these options of the command."""
         raise NotImplementedError
 
-    def __str__(self) -> str:
-        from springcheck.text.lines import as_text
+    def banks(self, **chosen: Any) -> list[Bank]:
+        """Its charts, for figures and for the report page."""
+        return []
 
+    def __str__(self) -> str:
         return as_text(study_of(self).lines(self))
 
     def _repr_html_(self) -> str:
-        from springcheck.text.lines import as_html
-
         return as_html(study_of(self).lines(self))
 
     def rows(self) -> list[dict[str, Any]]:
@@ -79,17 +82,40 @@ class StudyResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Studied(StudyResult):
-    """Result of a study that is stored by its document and tables."""
+    """Result of a study that is stored by its fields: those of `forms` as tables, the others as JSON."""
 
+    forms: ClassVar[Mapping[str, Form[Any]]] = {}
+    piece: ClassVar[str] = "method"
+    """Noun for what an interrupted call has finished."""
+
+    scene: Scene | None = None
     left_out: tuple[LeftOut, ...] = ()
     resumed: int = 0
     """Number of pieces that an interrupted call had finished."""
     path: Path | None = None
     """Path of the store."""
 
-    def kept_document(self) -> dict[str, Any]:
-        """The document as a store holds it, beside the tables."""
-        return self.document()
+    @property
+    def title(self) -> str:
+        """What was measured."""
+        raise NotImplementedError
+
+    def answer(self) -> Lines:
+        """What was found, in a sentence or two."""
+        return []
+
+    def tables(self) -> Lines:
+        """Tables, each below its caption, and notes on them."""
+        raise NotImplementedError
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        """Title, answer, tables, and the methods that were left out."""
+        from springcheck.studies.choose import left_out
+
+        were = "was" if self.resumed == 1 else "were"
+        taken = f"  {count(self.resumed, self.piece)} {were} finished by an interrupted call and resumed"
+        head = [plain(self.title, "bold"), *self.answer(), *[plain(taken)] * bool(self.resumed)]
+        return [*head, plain(), *self.tables(), *left_out(self.left_out)]
 
 
 def study_of(found: object) -> Study:
@@ -121,7 +147,7 @@ class Study:
         # first, while the stack is short: beyond a chunk of it Python 3.11 maps memory for every call, and
         # making the terms' classes takes hundreds
         import_module("springcheck.physics.terms")
-        measure = self._part("measure")
+        measure = self._measure
         if not gc.isenabled():
             # the program has disabled it for its imports: imported objects stay, and are not scanned
             gc.freeze()
@@ -132,23 +158,24 @@ class Study:
     def lines(self, found: StudyResult, options: Namespace | None = None, path: Path | None = None) -> Lines:
         """The report as text; with the `path` of its store the one of `inspect`."""
         where: Path | None = path or getattr(found, "path", None)
-        if self.trajectories or where is None:
-            return found.lines(options)
-        from springcheck.text.lines import plain
-
-        return [*found.lines(options), *([] if path else [plain(f"Stored in {where}")])]
+        stored = where is not None and not self.trajectories and path is None
+        return [*found.lines(options), *[plain(f"Stored in {where}")] * stored]
 
     def held(self, summary: Summary) -> bool:
         """Whether a store holds a study of this kind."""
         return bool(summary.runs) if self.trajectories else self.name in summary.documents
 
-    def stored(self, path: Path) -> StudyResult:
+    def stored(self, path: str | Path) -> Any:
         """The result that a store holds of this study.  StoreError where it cannot be read."""
-        found: StudyResult = self._part("measure").stored(path)
-        return found
+        if self.trajectories:
+            return self._measure.stored(Path(path))
+        from springcheck.studies import keeper
+
+        kinds = {name: x for name, x in vars(self._measure).items() if isinstance(x, type)}
+        return keeper.restored(self.name, Path(path), kinds)
 
     def drawn(
-        self, found: StudyResult, check: Callable[[list[str]], object] = list, **chosen: Any
+        self, found: StudyResult, check: Callable[[Sequence[str]], object] = list, **chosen: Any
     ) -> dict[str, bytes]:
         """The figures of a stored or a fresh result, with the options `chosen`, by the names of their files.
 
@@ -171,19 +198,8 @@ class Study:
         """Functions that draw its figures by matplotlib, by name."""
         from springcheck.figures import render
 
-        banks = self.banks(found, **chosen)
-        return {bank.name: partial(render.picture, bank) for bank in banks if bank.name}
-
-    def banks(self, found: StudyResult, **chosen: Any) -> list[Bank]:
-        """Its charts in figures and in the report page; none where it has no such part."""
-        if find_spec(f"{self._package}.page") is None:
-            return []
-        banks: list[Bank] = self._part("page").banks(found, **chosen)
-        return banks
-
-    def _part(self, name: str) -> Any:
-        return import_module(f"{self._package}.{name}")
+        return {bank.name: partial(render.picture, bank) for bank in found.banks(**chosen) if bank.name}
 
     @property
-    def _package(self) -> str:
-        return self.package or f"springcheck.studies.{self.name}"
+    def _measure(self) -> Any:
+        return import_module(f"{self.package or f'springcheck.studies.{self.name}'}.measure")

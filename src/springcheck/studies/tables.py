@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +22,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form(Generic[T]):
-    """Stored form of one kind of result.  A table's name is `beginning` and the key of its result."""
+    """Stored form of one kind of result.  A table's name is `beginning` and the method of its result."""
 
     kind: type[Any]
     beginning: str
@@ -37,27 +36,34 @@ class Form(Generic[T]):
     about: str = ""
     extra: Callable[[T], Mapping[str, Any]] = lambda found: {}
     """Columns for viewers that follow from the others; they are not read back."""
+    line: Callable[[T], str] = lambda found: ""
+    """The result in a line, printed as soon as it is measured."""
 
-    def table(self, key: str, found: T, **attributes: Any) -> Table:
+    def names(self, found: Sequence[Any]) -> list[str]:
+        """Names of the tables of these results."""
+        return [self.beginning + method for method in dict.fromkeys(one.method for one in found)]
+
+    def table(self, key: str, found: T) -> Table:
         """The result as a table; a signal is named where its axes have finite points."""
         kept, more = self._split(found)
         kept |= self.extra(found)
         shown = all(np.any(np.isfinite(kept[axis])) for axis in self.axes)
+        names = ("signal", "axes", "auxiliary", "log") if shown else ()
+        drawn = {name: getattr(self, name) for name in names}
         about = {"about": self.about} if self.about else {}
+        units = {name: unit for name, unit in self.units.items() if name in kept}
         return Table(
-            name=self.beginning + key,
-            columns=kept,
-            units={name: unit for name, unit in self.units.items() if name in kept},
-            attributes={**about, **more, **attributes},
-            signal=self.signal if shown else "",
-            axes=self.axes if shown else (),
-            auxiliary=self.auxiliary if shown else (),
-            log=self.log if shown else (),
+            name=self.beginning + key, columns=kept, units=units, attributes={**about, **more}, **drawn
         )
 
     def found(self, table: Table) -> T:
         """The result in such a table.  KeyError where it has another form."""
         raise NotImplementedError
+
+    def listed(self, table: Table) -> list[Any]:
+        """Its rows, or the one result that it is."""
+        found: Any = self.found(table)
+        return found if isinstance(found, list) else [found]
 
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
         """Columns and attributes."""
@@ -77,20 +83,15 @@ class RecordForm(Form[T]):
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
         values = [(one, getattr(found, one.name)) for one in self._fields]
         arrays = {one.name: x for one, x in values if one.is_array}
-        pairs = {name: np.reshape(x, (-1, 2)) for name, x in arrays.items() if isinstance(x, tuple)}
-        return arrays | pairs, {one.name: x for one, x in values if not one.is_array}
+        return arrays, {one.name: x for one, x in values if not one.is_array}
 
     def found(self, table: Table) -> T:
-        values = self._key(table)
-        for one in self._fields:
-            if one.is_array:
-                array = np.asarray(table.columns[one.name])
-                pairs = get_origin(one.hint) is tuple
-                values[one.name] = tuple(map(tuple, array.tolist())) if pairs else array
-            elif one.name in table.attributes or not one.has_default:
-                # fields that an earlier version did not measure have their default
-                values[one.name] = table.attributes[one.name]
-        return self.kind(**values)  # type: ignore[no-any-return]
+        columns, attributes = table.columns, table.attributes
+        values = {
+            one.name: np.asarray(columns[one.name]) if one.is_array else attributes[one.name]
+            for one in self._fields
+        }
+        return self.kind(**self._key(table), **values)  # type: ignore[no-any-return]
 
 
 class Rows(Form[Sequence[T]]):
@@ -106,23 +107,12 @@ class Rows(Form[Sequence[T]]):
         return [self.kind(**key, **{one.name: values[row] for one, values in parts}) for row in range(count)]
 
 
-class Documents(Form[T]):
-    """A result as a row of one text, its JSON document, for results that are lists of names."""
-
-    def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
-        return {"document": [msgspec.json.encode(found).decode()]}, {}
-
-    def found(self, table: Table) -> T:
-        return msgspec.json.decode(str(table.columns["document"][0]), type=self.kind)  # type: ignore[no-any-return]
-
-
 @dataclass(frozen=True, slots=True)
 class _Field:
     name: str
     hint: Any
     optional: bool
     keys: tuple[str, ...]
-    has_default: bool
     is_array: bool
 
 
@@ -138,8 +128,7 @@ def _fields(kind: Any) -> tuple[_Field, ...]:
             hint = str
         # from NumPy 2.5 on an array's hint is an alias with an origin of its own
         array = get_origin(hint) in (tuple, np.ndarray, NDArray) or hint is np.ndarray
-        keys, late = one.metadata.get("keys", ()), one.default is not MISSING
-        found.append(_Field(one.name, hint, optional, keys, has_default=late, is_array=array))
+        found.append(_Field(one.name, hint, optional, one.metadata.get("keys", ()), is_array=array))
     return tuple(found)
 
 

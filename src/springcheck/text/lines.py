@@ -37,6 +37,7 @@ class Text:
 
     @property
     def style(self) -> str:
+        """That of its first part; the page's template reads it."""
         return self.parts[0][1]
 
 
@@ -53,7 +54,7 @@ Row = Sequence[Cell] | Text
 class TextTable:
     """A table without rules, as narrow as its cells; only `prose` is wrapped to fit the width.
 
-    Columns that do not fit beside each other are stacked in blocks, each beside the first column: nothing is
+    Columns that do not fit the width are stacked in blocks, each with the first column: nothing is
     truncated, and no terminal has to fold a number.
     """
 
@@ -109,7 +110,7 @@ class TextTable:
 
 
 def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
-    """Blocks of columns that fit beside each other, the first one in each block."""
+    """Blocks of columns that fit the width, the first one in each block."""
     blocks, used = [[0]], widths[0]
     for j in range(1, len(widths)):
         if used + COLUMN_GAP + widths[j] > width and len(blocks[-1]) > 1:

@@ -12,13 +12,12 @@ from decimal import ROUND_FLOOR, Context, Decimal
 from itertools import pairwise
 from typing import Any, cast
 
-STATES_SHOW = ". What the states show: "
-"""Separator between the reason of a failed verdict and its cause."""
+DIAGNOSIS = ". Diagnosis: "
+"""Separator between the reason of a failed verdict and its diagnosis."""
 
 
 def described(one: Any) -> str:
-    """The docstring of a function or class, without its indent: that of its source where Python leaves
-    docstrings out (-OO)."""
+    """The docstring of a function or class; from its source where Python omits docstrings (-OO)."""
     if sys.flags.optimize < 2:
         return inspect.cleandoc(one.__doc__ or "")
     tree = ast.parse(textwrap.dedent(inspect.getsource(one)))

@@ -27,7 +27,7 @@ from springcheck.studies.run.drawable import drawable
 from springcheck.studies.run.page import banks
 from springcheck.studies.run.result import Stored
 from springcheck.text.lines import Lines, TextTable
-from springcheck.text.wording import STATES_SHOW
+from springcheck.text.wording import DIAGNOSIS
 
 
 def sections(summary: Summary) -> tuple[list[dict[str, Any]], dict[str, Any], Stored | None, Lines]:
@@ -45,7 +45,7 @@ def sections(summary: Summary) -> tuple[list[dict[str, Any]], dict[str, Any], St
             first = next((i for i, line in enumerate(blocks) if isinstance(line, TextTable)), len(blocks))
             tables = blocks[first:]
             continue
-        mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(study.banks(result))}
+        mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(result.banks())}
         data |= mine
         title = study.about[:1].upper() + study.about[1:]
         found.append({"name": study.name, "title": title, "blocks": blocks, "banks": list(mine)})
@@ -72,7 +72,7 @@ class Passed:
         first = next((v for v in self.verdicts if v.passed is False), None)
         if first is None:
             return ""
-        why, _, shown = first.why.partition(STATES_SHOW)
+        why, _, shown = first.why.partition(DIAGNOSIS)
         return (
             f"{self.method}: {shown}. {first.check}: {why}"
             if shown

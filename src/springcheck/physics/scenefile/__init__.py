@@ -32,11 +32,15 @@ def names() -> tuple[str, ...]:
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
-    """Read a shipped scene by name, or any scene file by path.
+    """Read a shipped scene by its name, or a scene file by its path.
 
-    Raises:
-        SceneError: no such scene, or an error in the file; it names the field, its value and the accepted
-            ones.
+    >>> load_scene("spring")
+    Scene('spring', 1 particle, 1 wall-spring, 200 steps of 0.1)
+
+    Raises
+    ------
+    SceneError
+        No such scene, or an error in the file: its field, its value, and what is accepted.
     """
     path, text = _read(name_or_path)
     return parse(text, name=path.stem, where=str(path))

@@ -12,6 +12,6 @@ STUDY = Study(
     arguments=(
         *team.arguments(),
         *store_arguments("extremes.h5"),
-        argument("--quick", action="store_true", help="fewer cells, in about 20 seconds"),
+        argument("--quick", action="store_true", help="fewer cells"),
     ),
 )

@@ -2,7 +2,7 @@
 
 A cell is right (each step within its bound), unstable as theory predicts, or at the engine's limit (a
 deviation with a named reason).  A deviation without a reason makes a cell silently wrong, and fails the
-study.
+study.  Many cells of one step share a run, as far as an engine that stops allows it.
 """
 
 from __future__ import annotations
@@ -15,19 +15,26 @@ from itertools import groupby
 from pathlib import Path
 from typing import Unpack
 
+import numpy as np
+
 from springcheck import engines
-from springcheck.engines.contract import Label
-from springcheck.errors import SpringcheckError
-from springcheck.physics.arrays import WIDE
+from springcheck.engines.contract import Label, Stopped
+from springcheck.errors import MethodError, SpringcheckError
+from springcheck.physics.arrays import WIDE, Floats
+from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
-from springcheck.studies.extremes import grid, running, stiff
+from springcheck.studies.extremes import grid, judging, stiff
+from springcheck.studies.extremes.grid import Spec
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.extremes.result import CALM_TURNS, CELLS, Atlas, Window
+from springcheck.studies.extremes.result import CELLS, Atlas
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import propagators
+
+ON_PLATFORM = (1e-12, 1e12)
+"""Forces and amplitudes of cells on a platform where every run takes a context: they share a single one."""
 
 
 def everything() -> tuple[str, ...]:
@@ -61,9 +68,9 @@ def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> At
     """The cells of these methods; those that an earlier call has saved are not measured again."""
     usable, left_out = sorted_out(labels, absence, "has extreme cases here")
     pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
-    work = [replace(x, cost=100.0 * on_platform(y) + 1.0) for x, y in zip(pieces, usable, strict=True)]
+    work = [replace(x, cost=10.0 if on_platform(y) else 1.0) for x, y in zip(pieces, usable, strict=True)]
     found = [cell for piece in kept.results(work) for cell in piece]
-    return Atlas(cells=tuple(found), windows=tuple(windows(found)), left_out=tuple(left_out))
+    return Atlas(cells=tuple(found), left_out=tuple(left_out))
 
 
 def on_platform(label: Label) -> bool:
@@ -87,52 +94,75 @@ def perform(options: Namespace, progress: Progress | None) -> Atlas:
     return record(options.output or "extremes.h5", options.method, quick=options.quick, **how)
 
 
-@keeper.restoring("extremes")
-def stored(kept: keeper.Kept) -> Atlas:
-    """The atlas that `record` has saved.  StoreError where the file holds none."""
-    known = kept.document
-    return Atlas(
-        cells=tuple(cell for name in known["tables"] for cell in CELLS.found(kept.tables[name])),
-        windows=tuple(Window(**window) for window in known["windows"]),
-        left_out=kept.left_out,
-    )
-
-
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
     """All cells of one method; of one that chooses its steps the stiff ones alone."""
     plane = [] if engines.method(label).adaptive else groups(label, quick=quick)
-    found = [cell for specs in plane for cell in running.cells(label, specs)]
+    found = [cell for specs in plane for cell in cells(label, specs)]
     return found if on_platform(label) else [*found, *stiff.cells(label)]
 
 
-def groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
+def groups(label: Label, *, quick: bool = False) -> list[list[Spec]]:
     """Groups of cells of one method of fixed step that can run side by side."""
 
-    def together(spec: grid.Spec) -> tuple[str, float]:
+    def together(spec: Spec) -> tuple[str, float]:
         return spec.block, spec.h
 
-    found = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
+    # sorted by force: where an engine stops over some, halves are soon of those alone
+    specs = grid.specs(quick=quick and not on_platform(label))
+    every = sorted(sorted(specs, key=lambda spec: spec.force), key=together)
+    found = [list(group) for _, group in groupby(every, together)]
     if on_platform(label):
-        # a context of such a platform takes a quarter of a second: only the groups of most cells
-        found = sorted(found, key=len)[-3 if quick else -24 :]
+        low, high = ON_PLATFORM
+        return [[x for x in found[0] if x.h_w < 2 and all(low < y < high for y in (x.force, x.q))]]
     return found
 
 
-def windows(cells: Sequence[Cell]) -> list[Window]:
-    """Decades of force around 1 to 1e6 in which a method's cells within `CALM_TURNS` are all right."""
-    found = []
-    for method in dict.fromkeys(cell.method for cell in cells):
-        calm: dict[int, bool] = {}
-        for cell in cells:
-            within = CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
-            if cell.method == method and cell.block == "force" and within:
-                calm[cell.decade] = calm.get(cell.decade, True) and cell.outcome in RIGHT
-        spans = [list(span) for right, span in groupby(sorted(calm), calm.__getitem__) if right]
-        span = next((span for span in spans if any(0 <= x <= 6 for x in span)), None)
-        if span is not None:
-            found.append(Window(method=method, low=10.0 ** span[0], high=10.0 ** span[-1]))
-    return found
+def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, Stopped | None]:
+    """Every frame as the engine left it, from the start on, finite or not, and how the engine stopped, if it
+    did: the frame that it did not reach is then the last, NaN.
+
+    The driver ends a run at the first non-finite number; here that is one cell among many.
+    """
+    with np.errstate(all="ignore"):
+        started = engines.load(label.engine).start(scene, engines.method(label), label, scene.step)
+        q, p = np.full((scene.frames, scene.n), np.nan), np.full((scene.frames, scene.n), np.nan)
+        q[0], p[0] = scene.q, scene.p
+        try:
+            started.advance(scene.every, q[1:], p[1:])
+        except Stopped as stop:
+            q[stop.rows + 1 :] = p[stop.rows + 1 :] = np.nan
+            return q[: stop.rows + 2], p[: stop.rows + 2], stop
+    return q, p, None
 
 
-RIGHT = ("right", "unstable, as theory says")
-"""Outcomes that are no fault of an engine's arithmetic."""
+def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
+    """Run and judge cells of one step and one length, in as few runs as the engine allows."""
+    half = len(specs) // 2
+    scene = grid.scene(list(specs), engines.method(label).requires)
+    try:
+        q, p, stop = raw(scene, label)
+    except MethodError as error:
+        if half:
+            # the engine may refuse all because of one
+            return cells(label, specs[:half]) + cells(label, specs[half:])
+        return [judging.cell(label, specs[0], "engine's limit", f"it refuses: {error}")]
+    found = judging.judge(label, specs, scene, q, p, stop)
+    if len(specs) == 1:
+        return found
+    if stale := engines.arithmetic(label).stale:
+        # beside a larger motion an engine recomputes forces that it would reuse for the cell alone
+        with np.errstate(invalid="ignore"):
+            # a state that has overflowed (inf or nan) does not count as slow
+            slow = np.any(np.abs(np.diff(q, axis=0)) <= 2 * stale, axis=0)
+        found = [
+            cells(label, [spec])[0] if alone else cell
+            for spec, cell, alone in zip(specs, found, slow, strict=True)
+        ]
+    if not stop:
+        return found
+    # the engine stopped: cells with a reason are done, the others run again
+    over = [x.outcome not in ("silently wrong", "right") and bool(x.reason) for x in found]
+    if not any(over) or all(over):
+        return cells(label, specs[:half]) + cells(label, specs[half:])
+    rest = iter(cells(label, [spec for spec, done in zip(specs, over, strict=True) if not done]))
+    return [cell if done else next(rest) for cell, done in zip(found, over, strict=True)]

@@ -6,6 +6,7 @@ from springcheck.studies.arguments import SCENE, argument, store_arguments
 from springcheck.studies.study import Study
 
 METRICS = ("largest", "end", "energy", "phase")
+"""Errors that a study may be about; every one is measured and stored."""
 
 STUDY = Study(
     name="precision",
@@ -21,4 +22,5 @@ STUDY = Study(
         argument("--step", type=float, metavar="H", help="the step of --long (default: the scene's)"),
         *store_arguments("SCENE-precision.h5"),
     ),
+    chooses=("x", "y"),
 )  # fmt: skip

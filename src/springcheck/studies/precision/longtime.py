@@ -9,8 +9,7 @@ velocity Verlet overtakes RK4 after 18/(h w)**4 steps.
 from __future__ import annotations
 
 import math
-from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations
@@ -22,15 +21,18 @@ import numpy as np
 from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SceneError
+from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
+from springcheck.figures.looks import scheme_of
+from springcheck.figures.naming import labelled
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import How, Keeper, Piece, document
 from springcheck.studies.precision.accuracy import Errors, Truth, own_motion, truth
+from springcheck.studies.precision.result import MOST_SHOWN
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
-from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 
 FIRST_PERIODS, FRAMES = 100.0, 256
@@ -55,7 +57,9 @@ class LongRun:
 
 
 LONG: RecordForm[LongRun] = RecordForm(
-    kind=LongRun, beginning="precision/", signal="error", axes=("periods",), log=("periods", "error")
+    kind=LongRun, beginning="precision/", signal="error", axes=("periods",), log=("periods", "error"),
+    line=lambda x: f"{x.method}: error {x.error[-1]:.1e} after {x.periods[-1]:.0e} periods"
+    if len(x.error) else "",
 )  # fmt: skip
 
 
@@ -140,12 +144,13 @@ class LongTime(Studied):
     """Errors of methods over long times; a row of its table is a method."""
 
     table_of: ClassVar[str] = "methods"
+    forms: ClassVar = {"runs": LONG}
 
     scene: Scene
     metric: str
     periods: float
     runs: tuple[LongRun, ...]
-    machine: dict[str, str]
+    machine: Mapping[str, str]
 
     @property
     def w(self) -> float:
@@ -174,30 +179,33 @@ class LongTime(Studied):
                     out.append((a, b, float(np.exp(np.interp(0, y, x)))))
         return out
 
-    def lines(self, options: Namespace | None = None) -> Lines:
-        """Errors by method and number of periods, and where higher orders fall behind."""
-        w = self.w
+    @property
+    def title(self) -> str:
+        of = f"h w = {abs(self.scene.step) * self.w:.4g}"
+        return f"{self.scene.title}: errors over {self.periods:.0e} periods at {of}"
+
+    def answer(self) -> Lines:
+        """Where higher orders fall behind."""
+        out = []
+        for a, b, steps in self.crossings:
+            periods = steps * abs(self.scene.step) * self.w / (2 * math.pi)
+            said = f"{a.method} (order {a.order}) falls behind {b.method} (order {b.order}) after"
+            out.append(plain(f"{said} {steps:,.0f} steps ({periods:,.0f} periods)."))
+        return out
+
+    def tables(self) -> Lines:
+        """Errors by method and number of periods."""
         lengths: list[float] = max((x.periods.tolist() for x in self.runs), key=len, default=[])
         rows = []
         for x in self.runs:
             cells = [f"{y:.1e}" for y in x.error]
             rows.append((x.method, str(x.order), *cells, *["-"] * (len(lengths) - len(cells))))
-        of = f"h w = {abs(self.scene.step) * w:.4g}"
-        out: Lines = [
-            plain(f"{self.scene.title}: errors over {self.periods:.0e} periods at {of}", "bold"),
-            *resumed(self.resumed, "method"), plain(),
+        short = ", ".join(f"{x.method} ({x.why})" for x in self.runs if x.why)
+        return [
             plain(f"{self.metric.capitalize()} error after so many periods"),
-            table(("method", "order", *(f"{x:.0e}" for x in lengths)), rows), plain(),
-        ]  # fmt: skip
-        for a, b, steps in self.crossings:
-            periods = steps * abs(self.scene.step) * w / (2 * math.pi)
-            after = f"after {steps:,.0f} steps ({periods:,.0f} periods)"
-            out.append(
-                plain(f"{a.method} (order {a.order}) falls behind {b.method} (order {b.order}) {after}.")
-            )
-        short = [f"{x.method} ({x.why})" for x in self.runs if x.why]
-        out += [plain(f"Not measured further: {', '.join(short)}.", "dim")] if short else []
-        return out + left_out(self.left_out)
+            table(("method", "order", *(f"{x:.0e}" for x in lengths)), rows),
+            *[plain(f"Not measured further: {short}.", "dim")] * bool(short),
+        ]
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -206,3 +214,30 @@ class LongTime(Studied):
             methods=self.runs, left_out=self.left_out,
             crossings=[{"method": a.method, "than": b.method, "steps": x} for a, b, x in self.crossings],
         )  # fmt: skip
+
+    def banks(self, **chosen: Any) -> list[Bank]:
+        """The law of each scheme as a line, measurements as marks."""
+        if not any(len(x.error) for x in self.runs):
+            return []
+        curves, per = [], self.w * abs(self.scene.step) / (2 * math.pi)
+        for x in self.runs:
+            group = scheme_of(x.method)
+            curves.append(Curve(name=x.method, group=group, x=x.law_steps * per, y=x.law))
+            curves.append(Curve(name=x.method, group=group, x=x.periods, y=x.error, line=False, marks=True))
+        values = np.concatenate([np.asarray(x.y) for x in curves])
+        least, most = float(np.min(values[values > 0])), float(np.nanmax(values))
+        rules = []
+        heading = f"{self.scene.name}: {self.metric} error over {self.periods:.0e} periods"
+        # the highest order, and the first of at most half of it by which it is overtaken
+        crossings = sorted(self.crossings, key=lambda x: (-x[0].order, 2 * x[1].order > x[0].order, x[2]))
+        if crossings:
+            a, b, steps = crossings[0]
+            heading = f"{a.method} falls behind {b.method} after {steps:,.0f} steps"
+            rules = [Rule(axis="x", at=steps * per, name=f"{steps * per:,.0f} periods")]
+        shown = max(1e-16, 10.0 ** math.floor(math.log10(least))), min(MOST_SHOWN, 2 * most)
+        chart = labelled(Chart(
+            title="Errors over long times: lines in theory, marks as measured.",
+            x=Scale(name="periods", log=True),
+            y=Scale(name=f"{self.metric} error", log=True, shown=shown), curves=curves, rules=rules,
+        ))  # fmt: skip
+        return [Bank(name="precision-long", heading=heading, title="Methods", charts=[chart])]

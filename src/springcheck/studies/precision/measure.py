@@ -27,8 +27,8 @@ from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.keeper import How, Keeper
 from springcheck.studies.precision import longtime
 from springcheck.studies.precision.accuracy import truth
-from springcheck.studies.precision.longtime import LONG, LongTime
-from springcheck.studies.precision.points import CUT_OFF, POINTS, of_methods, points_of
+from springcheck.studies.precision.longtime import LongTime
+from springcheck.studies.precision.points import CUT_OFF, POINTS
 from springcheck.studies.precision.result import PrecisionStudy
 from springcheck.studies.precision.sweeping import Sweeping, begin, level
 
@@ -77,14 +77,14 @@ def record(
 def _measure(
     scene: Scene, labels: Sequence[Label], budget: float, metric: str, left: Sequence[LeftOut], kept: Keeper
 ) -> PrecisionStudy:
-    known, form = truth(scene), points_of(scene)
+    known = truth(scene)
     began = perf_counter()
 
     def tell(what: str) -> None:
         if kept.progress:
             kept.progress(min(perf_counter() - began, budget), budget, what)
 
-    sweeps = []
+    sweeps: list[Sweeping] = []
     for label in labels:
         tell(f"starting {label}")
         sweeps.append(begin(scene, label, known))
@@ -93,6 +93,7 @@ def _measure(
             if point.outcome != CUT_OFF and sweeps[-1].scene is not None:
                 sweeps[-1].take(point)
                 kept.resumed += 1
+        kept.say(sweeps[-1].line(metric))
     spent = sum(sweep.spent for sweep in sweeps)
     # the first run of a method pays for imports and compilation, outside the budget
     began = perf_counter() - spent
@@ -102,15 +103,16 @@ def _measure(
         if perf_counter() < now:
             raise SpringcheckError("the clock of this machine runs backwards: nothing can be timed by it")
         for sweep in ready:
-            kept.keep(form, str(sweep.label), sweep.points)
+            kept.keep(POINTS, str(sweep.label), sweep.points)
+            kept.say(sweep.line(metric))
     for sweep in sweeps:
         if sweep.scene is not None:
             sweep.points.append(sweep.point(CUT_OFF, f"the budget of {budget:g} s ends before it"))
-        kept.keep(form, str(sweep.label), sweep.points)
+        kept.keep(POINTS, str(sweep.label), sweep.points)
     return PrecisionStudy(
         scene=scene, metric=metric, budget=budget, seconds=perf_counter() - began,
-        sweeps=tuple(of_methods([x for sweep in sweeps for x in sweep.points], metric)),
-        machine=keeper.origin(labels), python_call=_python_call(scene), left_out=tuple(left),
+        points=tuple(x for sweep in sweeps for x in sweep.points), machine=keeper.origin(labels),
+        python_call=_python_call(scene), left_out=tuple(left),
     )  # fmt: skip
 
 
@@ -156,18 +158,3 @@ def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy | L
     scene = scene if options.step is None else scene.derived(step=options.step)
     path = options.output or f"{scene.name}-long.h5"
     return longtime.record(scene, labels, path, periods=options.long, **how)
-
-
-@keeper.restoring("precision")
-def stored(kept: keeper.Kept) -> PrecisionStudy | LongTime:
-    """The study that was saved.  StoreError where the file holds none."""
-    scene, known = keeper.stored_scene(kept.path), kept.document
-    names = [one["method"] for one in known["methods"]]
-    same = {name: known[name] for name in ("metric", "machine")} | {"scene": scene, "left_out": kept.left_out}
-    if "periods" in known:
-        return LongTime(periods=known["periods"], runs=tuple(kept.found(LONG, x) for x in names), **same)
-    points = [point for name in names for point in kept.found(POINTS, name)]
-    return PrecisionStudy(
-        budget=known["budget_seconds"], seconds=known["seconds"], python_call=known["python_call_seconds"],
-        sweeps=tuple(of_methods(points, known["metric"])), **same,
-    )  # fmt: skip

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.tables import Rows
@@ -19,6 +18,17 @@ CANNOT_RUN, CUT_OFF = "cannot run", "cut off"
 
 COSTS = {"time": "run time [s]", "calls": "force calls"}
 """Costs of a point, and their names on an axis."""
+
+TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+"""Errors to which costs are reported."""
+
+METRICS = {
+    "largest": "largest error, relative to the initial energy norm",
+    "end": "error at the end, relative to the initial energy norm",
+    "energy": "largest energy error, relative to the initial kinetic and potential energy",
+    "phase": "largest phase error, in radians",
+}
+"""Errors of a point, in words."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +120,10 @@ class Sweep:
         best = fits.turned(self.errors, by=2 if self.adaptive else 1)
         return None if best is None else self.errors[best]
 
+    def values(self, name: str) -> list[float]:
+        """Costs or errors of the complete points, by name."""
+        return self.costs(name) if name in COSTS else [point.error(name) for point in self.complete]
+
     def costs(self, kind: str) -> list[float]:
         """Costs of the complete points.  Of run times the monotone envelope: a coarser run takes no longer
         than a finer one, unless the machine was busy."""
@@ -141,28 +155,20 @@ class Sweep:
 
 
 POINTS: Rows[Point] = Rows(
-    kind=Point,
-    beginning="precision/",
-    units={
-        "phase_error": "rad", "run_seconds": "s",
-        **{one.name: "s" for one in fields(Point) if "seconds" in one.name},
-    },
-    signal="max_error", axes=("run_seconds",), log=("run_seconds", "max_error"),
-    about="error against run time; errors relative to the initial energy norm; -1 and NaN: not known",
+    kind=Point, beginning="precision/", signal="max_error", axes=("run_seconds",),
+    log=("run_seconds", "max_error"),
+    units={"phase_error": "rad", "run_seconds": "s",
+           **{one.name: "s" for one in fields(Point) if "seconds" in one.name}},
+    about="error against run time; errors relative to the initial energy norm; -1 and NaN: not known; steps "
+          "in the scene's unit of time",
     extra=lambda points: {"run_seconds": np.array([point.seconds for point in points])},
 )  # fmt: skip
 """A table for each method, its points from coarse to fine."""
 
 
-def points_of(scene: Scene) -> Rows[Point]:
-    """`POINTS` with the scene's unit of time."""
-    time = {"reduced": "1", "md": "ps", "si": "s"}[scene.units]
-    return replace(POINTS, units={**POINTS.units, "step": time})
-
-
-def of_methods(points: Sequence[Point], metric: str) -> list[Sweep]:
+def of_methods(points: Sequence[Point], metric: str) -> tuple[Sweep, ...]:
     """The points of each method, coarse to fine."""
-    names = dict.fromkeys(x.method for x in points)
-    return [
-        Sweep(method=one, points=tuple(x for x in points if x.method == one), metric=metric) for one in names
-    ]
+    found: dict[str, list[Point]] = {}
+    for point in points:
+        found.setdefault(point.method, []).append(point)
+    return tuple(Sweep(method=x, points=tuple(mine), metric=metric) for x, mine in found.items())

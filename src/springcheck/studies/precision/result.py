@@ -1,33 +1,42 @@
-"""Result of a study of precision: plain data, and its text."""
+"""Result of a study of precision: plain data, its text, and its figures."""
 
 from __future__ import annotations
 
 import math
-from argparse import Namespace
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+
 from springcheck import schemes
+from springcheck.errors import SpringcheckError
+from springcheck.figures.charts import GUIDE, LOWEST, Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of
+from springcheck.figures.naming import labelled
 from springcheck.physics.scene import Scene
-from springcheck.studies.choose import LeftOut
+from springcheck.studies.choose import LeftOut, left_out
 from springcheck.studies.keeper import document
-from springcheck.studies.precision.fits import Fit
-from springcheck.studies.precision.points import CANNOT_RUN, Point, Sweep
+from springcheck.studies.precision.fits import ASYMPTOTIC_ERROR, Fit
+from springcheck.studies.precision.points import (
+    CANNOT_RUN,
+    COSTS,
+    METRICS,
+    POINTS,
+    TARGETS,
+    Point,
+    Sweep,
+    of_methods,
+)
 from springcheck.studies.study import Studied
-from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
-from springcheck.text.wording import count, few, seconds
+from springcheck.text.wording import count, seconds
 
-TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-"""Errors to which costs are reported."""
+UNNAMED = ("springcheck", "machine", "system", "host", "cores", "h5py", "hdf5")
+"""What of the machine and the versions is not in the small print of a figure."""
 
-METRIC_WORDS = {
-    "largest": "largest error, relative to the initial energy norm",
-    "end": "error at the end, relative to the initial energy norm",
-    "energy": "largest energy error, relative to the initial kinetic and potential energy",
-    "phase": "largest phase error, in radians",
-}
+MOST_SHOWN = 3.0
+"""Largest error that is shown at first: larger ones are uninformative."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -35,13 +44,16 @@ class PrecisionStudy(Studied):
     """Everything that a study of precision has found on one scene; a row of its table is a point."""
 
     table_of: ClassVar[str] = "points"
+    forms: ClassVar = {"points": POINTS}
+    piece: ClassVar[str] = "point"
 
     scene: Scene
     metric: str
     budget: float
     seconds: float
-    sweeps: tuple[Sweep, ...]
-    machine: dict[str, str]
+    points: tuple[Point, ...]
+    """The points of all methods."""
+    machine: Mapping[str, str]
     python_call: float
     """Seconds of a force evaluated in Python."""
 
@@ -51,9 +63,9 @@ class PrecisionStudy(Studied):
         return f"PrecisionStudy({self.scene.name!r}, {done}, smallest error {best:.1e})"
 
     @property
-    def points(self) -> tuple[Point, ...]:
-        """The points of all methods."""
-        return tuple(point for sweep in self.sweeps for point in sweep.points)
+    def sweeps(self) -> tuple[Sweep, ...]:
+        """The points of each method."""
+        return of_methods(self.points, self.metric)
 
     @property
     def status(self) -> Literal[0, 2]:
@@ -67,24 +79,26 @@ class PrecisionStudy(Studied):
 
     def winner(self, kind: str, target: float) -> tuple[Sweep, float] | None:
         """The method that reaches an error at the least cost, of those measured, and the cost."""
-        found = [(x.cost(kind, target), j) for j, x in enumerate(self.measured)]
-        best, j = min(found, default=(math.inf, 0))
-        return (self.measured[j], best) if best < math.inf else None
+        found = [(x.cost(kind, target), j, x) for j, x in enumerate(self.measured)]
+        best, _, sweep = min(found, default=(math.inf, 0, None))
+        return None if sweep is None or best == math.inf else (sweep, best)
 
-    def lines(self, options: Namespace | None = None) -> Lines:
-        """The report: winners, costs of each error by method, orders and floors, what was not measured."""
-        out: Lines = [
-            plain(f"{self.scene.title}: error against run time and force calls", "bold"),
-            plain(f"Error: {METRIC_WORDS[self.metric]}."),
-            *resumed(self.resumed, "point"),
-            plain(),
-        ]
+    @property
+    def title(self) -> str:
+        return f"{self.scene.title}: error against run time and force calls"
+
+    def answer(self) -> Lines:
+        return [plain(f"Error: {METRICS[self.metric]}.")]
+
+    def tables(self) -> Lines:
+        """Winners, costs of each error by method, orders and floors, what was not measured."""
+        out: Lines = []
         if self.measured:
             out += [self._winners(), plain(), plain("Run time to an error of"), self._costs("time")]
             out += [plain(), plain("Force calls to an error of"), self._costs("calls"), plain()]
             out += [self._orders(), plain(), *self._calibration(), *self._notes()]
         unable = [LeftOut(method=x.method, reason=x.message) for x in self.points if x.outcome == CANNOT_RUN]
-        return out + left_out([*self.left_out, *unable])
+        return out + left_out(unable)
 
     def _winners(self) -> TextTable:
         rows: list[Row] = []
@@ -103,7 +117,7 @@ class PrecisionStudy(Studied):
         for x in self.measured:
             cells: list[Text] = []
             for target, won in zip(TARGETS, best, strict=True):
-                cheapest = won is not None and won[0] is x
+                cheapest = won is not None and won[0].method == x.method
                 below = x.floor is not None and target < x.floor
                 cost = x.cost(kind, target)
                 text = _cost(kind, cost) if cost < math.inf else "floor" if below else "-"
@@ -131,7 +145,7 @@ class PrecisionStudy(Studied):
         said = f"A force call with its share of a step takes: {', '.join(costs)}."
         python = f"The force alone, called from Python: {seconds(self.python_call)}."
         pairs = [(self.winner("time", x), self.winner("calls", x)) for x in TARGETS]
-        differ = any(a and b and a[0] is not b[0] for a, b in pairs)
+        differ = any(a and b and a[0].method != b[0].method for a, b in pairs)
         why = "The winners differ where fewer force calls cost more time each." if differ else ""
         return [plain(x) for x in (said, python, why) if x]
 
@@ -139,7 +153,7 @@ class PrecisionStudy(Studied):
         out: Lines = [plain("*: least of the methods measured; floor: never below its rounding floor", "dim")]
         if lower := self._lowered:
             why = "has order 1 here: its kicks use forces that depend on velocities"
-            out.append(plain(f"{few(lower, 4)}: {why}"))
+            out.append(plain(f"{', '.join(lower)}: {why}"))
         if any(not x.points[-1].complete for x in self.measured):
             out.append(
                 plain(f"-: not measured, the budget of {self.budget:g} s or the run ended (--budget)", "dim")
@@ -151,15 +165,12 @@ class PrecisionStudy(Studied):
         """Methods with an order that friction in their kicks lowers."""
         if not any(term.kind == "friction" for term in self.scene.terms):
             return []
-        known, fitted = schemes.known(), [x.method for x in self.measured if x.fit]
-        found = [(label, known.get(scheme_of(label))) for label in fitted]
+        found = [(x.method, schemes.known().get(scheme_of(x.method))) for x in self.measured if x.fit]
         return [label for label, scheme in found if scheme and scheme.braked_order < scheme.order]
 
     def document(self) -> dict[str, Any]:
         """The study as plain data for JSON; unknown values are None."""
-        winners = [
-            (target, kind, self.winner(kind, target)) for target in TARGETS for kind in ("time", "calls")
-        ]
+        winners = [(x, kind, self.winner(kind, x)) for x in TARGETS for kind in ("time", "calls")]
         return document(
             scene=self.scene.name, metric=self.metric, budget_seconds=self.budget, seconds=self.seconds,
             machine=self.machine, python_call_seconds=self.python_call,
@@ -171,6 +182,53 @@ class PrecisionStudy(Studied):
             ],
             left_out=self.left_out,
         )  # fmt: skip
+
+    def banks(self, **chosen: Any) -> list[Bank]:
+        """The best method of each order against both costs, and the methods of each order.
+
+        `x`, `y`: any cost or error along either axis instead.
+        """
+        for axis, name in chosen.items():
+            if name not in QUANTITIES:
+                raise SpringcheckError(f"--{axis} {name}: one of {', '.join(QUANTITIES)} is needed")
+        if not (sweeps := [x for x in self.measured if any(np.array(x.errors) > 0)]):
+            return []
+        families: dict[str, list[Sweep]] = {}
+        for x in sorted(sweeps, key=lambda x: (x.adaptive, _scheme_order(x))):
+            families.setdefault("adaptive" if x.adaptive else f"order {_scheme_order(x)}", []).append(x)
+        named = {name: text for name, text in self.machine.items() if name not in UNNAMED}
+        versions = ", ".join(f"{name} {text}" for name, text in named.items())
+        how = "run times without starts and recording, the fastest of repeats"
+        foot = f"{self.scene.title}; best of {len(sweeps)} methods measured; {how}; {versions}"
+        x, y = chosen.get("x", "time"), chosen.get("y", self.metric)
+        if chosen:
+            chart = _chart(sweeps, x, y, "")
+            name = f"precision-{y}-over-{x}"
+            return [Bank(name=name, heading=chart.title[:-1], title="Methods", charts=[chart], foot=foot)]
+        best = [min(family, key=_rank) for family in families.values()]
+        charts = [_chart(best, kind, y, f"best of each order, against {COSTS[kind]}") for kind in COSTS]
+        several = [_chart(family, "time", y, name) for name, family in families.items() if len(family) > 1]
+        found = [
+            Bank(name="precision", heading=self._heading, title="Best methods", charts=charts, foot=foot)
+        ]
+        if several:
+            heading = f"{self.scene.name}: methods of one order against run time"
+            found.append(Bank(name="precision-orders", heading=heading, title="Methods", charts=several,
+                              foot=foot, columns=2, size=(4.2, 3.0)))  # fmt: skip
+        return found
+
+    @property
+    def _heading(self) -> str:
+        target = next((x for x in TARGETS[2:] if self.winner("time", x)), TARGETS[0])
+        won = [self.winner(kind, target) for kind in ("time", "calls")]
+        time, calls = (x[0].method if x else "none" for x in won)
+        if time == calls:
+            return f"{target:.0e}: {time} takes least time and force calls"
+        return f"{target:.0e}: {time} is fastest, {calls} calls forces least"
+
+
+QUANTITIES = {**COSTS, **{name: f"{name} error" for name in METRICS}}
+"""What an axis of the figure may show, and its name there."""
 
 
 def _cost(kind: str, x: float) -> str:
@@ -187,3 +245,62 @@ def _order(fit: Fit | None) -> str:
         return "-"
     digits = min(4, max(0, -math.floor(math.log10(fit.standard_error)))) if fit.standard_error else 4
     return f"{fit.order:.{digits}f}({fit.standard_error:.0e})"
+
+
+def _scheme_order(x: Sweep) -> int:
+    """The order of a method's scheme."""
+    scheme = schemes.known().get(scheme_of(x.method))
+    return scheme.order if scheme else 0
+
+
+def _rank(x: Sweep) -> float:
+    """Product of the run times of all errors: a day where one is not reached."""
+    return math.prod(min(x.cost("time", target), 86400.0) for target in TARGETS)
+
+
+def _chart(sweeps: Sequence[Sweep], kind: str, metric: str, short: str) -> Chart:
+    """One quantity of these methods over another, the least of it as an envelope."""
+    curves, rules, everything = [], [], []
+    triangles: dict[int, Curve] = {}
+    cheapest = min(sweeps, key=_rank).method
+    for x in sweeps:
+        pairs = zip(x.values(kind), x.values(metric), strict=True)
+        everything += (known := [(c, e) for c, e in pairs if c > 0 and e > 0])
+        costs, errors = (list(y) for y in zip(*known, strict=True)) if known else ([], [])
+        group = scheme_of(x.method)
+        curves.append(Curve(name=x.method, group=group, x=costs, y=errors, marks=True))
+        if metric == x.metric and kind in COSTS:
+            floor, order = x.floor, round(x.fit.order) if x.fit else 0
+            if floor is not None:
+                name = f"floor {floor:.0e}"
+                rules.append(Rule(axis="y", at=floor, name=name, look="floor", group=group))
+            if order and (order not in triangles or x.method == cheapest):
+                triangles[order] = _triangle(order, known, floor or 0.0)
+    least, most = (f(e for _, e in everything) for f in (min, max))
+    curves += [*triangles.values(), *[_envelope(everything)] * (kind in COSTS)]
+    shown = 10.0 ** math.floor(math.log10(least)), min(MOST_SHOWN if metric in METRICS else most, 2 * most)
+    return labelled(Chart(
+        title=f"{QUANTITIES[metric]} over {QUANTITIES[kind]}.".capitalize(), short=short,
+        x=Scale(name=QUANTITIES[kind], log=True), y=Scale(name=QUANTITIES[metric], log=True, shown=shown),
+        curves=curves, rules=rules,
+    ), by_name=True)  # fmt: skip
+
+
+def _triangle(order: int, points: Sequence[tuple[float, float]], floor: float) -> Curve:
+    """A triangle of the slope of an order, below the asymptotic part of a curve."""
+    known = [(c, e) for c, e in points if 1e3 * floor < e < ASYMPTOTIC_ERROR] or [*points]
+    cost, error = known[len(known) // 2]
+    wide = 0.3
+    x = [cost * 10 ** (wide * z) for z in (0, 0, 1, 0)]
+    y = [error / 8 * 10 ** (-wide * order * z) for z in (0, 1, 1, 0)]
+    return Curve(name=f"{order}", group=GUIDE, x=x, y=y)
+
+
+def _envelope(points: Sequence[tuple[float, float]]) -> Curve:
+    """The lowest error for each cost."""
+    best: list[tuple[float, float]] = []
+    for cost, error in sorted(points):
+        if not best or error < best[-1][1]:
+            best.append((cost, error))
+    x, y = zip(*best, strict=True)
+    return Curve(name="least cost of an error", group=LOWEST, x=x, y=y)

@@ -19,8 +19,8 @@ from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import bare, fits
 from springcheck.studies.precision.accuracy import MOST_COMPARED_FRAMES, Errors, Truth
-from springcheck.studies.precision.points import CANNOT_RUN, Point
-from springcheck.text.wording import count
+from springcheck.studies.precision.points import CANNOT_RUN, TARGETS, Point
+from springcheck.text.wording import count, seconds
 
 TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
 """Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16: a solver's response to one
@@ -79,6 +79,18 @@ class Sweeping:
             tolerance=scene.tolerance if scene is not None and adaptive else None,
             outcome=outcome, message=message,
         )  # fmt: skip
+
+    def line(self, metric: str) -> str:
+        """What is newly known: the time of a step, or the smallest of `TARGETS` that was reached."""
+        if not self.points:
+            steps = self.scene.steps if self.scene else 0
+            return f"{self.label}: {seconds(self.run / steps)} a step" if self.run and steps else ""
+        *before, last = [x.error(metric) for x in self.points]
+        reached = [x for x in TARGETS if last <= x < min(before, default=np.inf)]
+        if not reached:
+            return ""
+        took = f"in {seconds(self.points[-1].seconds)}, {self.points[-1].force_calls} force calls"
+        return f"{self.label}: {metric} error {reached[-1]:.0e} {took}"
 
     def take(self, point: Point) -> None:
         """Append a measured point, estimate the cost of the next one from it, and advance to it."""

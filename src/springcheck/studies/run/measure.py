@@ -133,7 +133,9 @@ def run(
     command = keeper.command("run", labels, scene.digest, *options)
     with keeper.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
-        keeper.need_space(journal.path, keeper.size(scene) * (len(labels) + len(wrong) - len(resumed)))
+        # each twice: until the store is in its place the parts stay
+        many = 2 * (len(labels) + len(wrong)) - len(resumed)
+        keeper.need_space(journal.path, keeper.size(scene) * many)
         for label in tuple(labels):
             if str(label) in resumed:
                 continue

@@ -16,17 +16,17 @@ from springcheck.checks.compare import Same
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
-from springcheck.studies.choose import LeftOut
+from springcheck.studies.choose import LeftOut, left_out
 from springcheck.studies.keeper import document, read
 from springcheck.studies.run import text
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.study import StudyResult
-from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Text, hanging, plain
 from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.bath.heat import Heated
+    from springcheck.figures.charts import Bank
     from springcheck.studies.run.drawable import Drawable
 
 
@@ -116,6 +116,11 @@ class Report(StudyResult):
             out += hanging("", left)
         out += self._left(all_of_them=getattr(options, "left_out", False))
         return [*out, *text.in_full(verdicts, options)]
+
+    def banks(self, **chosen: Any) -> list[Bank]:
+        from springcheck.studies.run.page import banks
+
+        return banks(self, **chosen)
 
     def _left(self, *, all_of_them: bool) -> Lines:
         """How many methods did not run, or each of them with its reason."""
@@ -262,6 +267,11 @@ class Stored(StudyResult):
             out += [plain(), plain("Largest differences, relative to the initial energy norm:")]
             out.append(text.differences(self.comparison))
         return out
+
+    def banks(self, **chosen: Any) -> list[Bank]:
+        from springcheck.studies.run.page import banks
+
+        return banks(self, **chosen)
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""

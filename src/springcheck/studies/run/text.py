@@ -12,11 +12,11 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.compare import Same
-from springcheck.physics.exact import no_reference
+from springcheck.physics.exact import has_true_motion, no_reference
+from springcheck.physics.norm import energy_scale
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
-from springcheck.studies.text import of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
 from springcheck.text.wording import number, rounded_down, seconds
 
@@ -97,6 +97,19 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
             for said in {run.message: None for run in runs if run.outcome == "complete" and run.message}
         ),
     ]
+
+
+def of_energy(scene: Scene) -> str:
+    """Explanation of the column of energies, relative to the scene's `energy_scale`."""
+    system = scene.system
+    changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
+    known = bool(changes) and has_true_motion(scene)
+    off = f"H - H{' exact' if known else '0'}"
+    of = energy_scale(scene.system)[1]
+    over = "|H0|" if of == "initial energy" else f"({of})"
+    part = f"({off})/{over}" if of else off
+    how = f", the {'exact ' * known}{' and '.join(changes)} {'taken off' if known else 'in it'}"
+    return f"{part} where it is largest{how if changes else ''}"
 
 
 def _error(x: float) -> str:

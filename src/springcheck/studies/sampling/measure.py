@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
@@ -13,7 +13,7 @@ from typing import Unpack
 import numpy as np
 
 from springcheck import driver, engines, schemes
-from springcheck.bath import THERMOSTATS, Law
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -24,6 +24,7 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper, each
+from springcheck.studies.sampling.laws import RATE, last_stable, law_at, limits
 from springcheck.studies.sampling.result import SAMPLED, Sampled, Sampling
 
 MASS, STIFFNESS, KT = 3.7, 2.9, 1.7
@@ -31,8 +32,8 @@ MASS, STIFFNESS, KT = 3.7, 2.9, 1.7
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 
-SAMPLED_TURNS, RATE = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4]), 0.4
-"""h omega, and friction over omega, at which temperatures are measured."""
+SAMPLED_TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
+"""h omega at which temperatures are measured."""
 
 FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 """Friction over omega at which limits are measured."""
@@ -42,9 +43,6 @@ WIDE, FRAMES, BLOCKS = 1000, 500, 20
 
 WAIT, SLOWEST_DECAY = 5.0, 0.002
 """Decay times of the motion and of its variances before frames are used, and the least decay a step."""
-
-LARGEST_H_OMEGA, RESOLVED = 8.0, 5e-5
-"""Largest h omega up to which a limit is looked for, and the largest error of a limit."""
 
 HOTTEST_LAW = 100.0
 """Largest temperature of a law over the bath's: above it, motion is not bounded within these steps."""
@@ -69,12 +67,6 @@ def temperature(squares: Floats) -> tuple[float, float]:
     alone = float(np.std(np.mean(squares, axis=0))) / np.sqrt(squares.shape[1])
     blocks = [np.mean(block) for block in np.array_split(squares, BLOCKS)]
     return float(np.mean(squares)), max(alone, float(np.std(blocks, ddof=1)) / np.sqrt(BLOCKS))
-
-
-def law_at(scheme: str, turns: Floats, frictions: Floats | float) -> Law:
-    """The law of a scheme at these h omega and frictions over omega (n,)."""
-    one = np.ones(len(turns))
-    return Law(scheme=THERMOSTATS[scheme], h=1.0, m=one, k=turns**2, rate=frictions * turns, thermal=1.0)
 
 
 def measured(label: Label) -> Sampled:
@@ -129,37 +121,6 @@ def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(A)))) ** 2
 
 
-def last_stable(radius: Callable[[Floats], Floats], n: int, to: float) -> Floats:
-    """The largest h omega (n,) up to which no map grows, `to` this part of it; infinity where none up to 8
-    does, NaN where growth there is too slow to tell from none.
-
-    The rounding of a map is 1e-15; where its two eigenvalues coincide it acts by its square root.
-    """
-    slack, low, high = 1e-7, np.zeros(n), np.full(n, np.inf)
-    for turn in np.geomspace(0.02, LARGEST_H_OMEGA, 25):
-        going = np.isinf(high)
-        stable = radius(np.full(n, turn)) <= 1 + slack
-        low, high = np.where(going & stable, turn, low), np.where(going & ~stable, turn, high)
-        if not np.any(np.isinf(high)):
-            break
-    endless = np.isinf(high)
-    while np.any(~endless & (high - low > to * high) & (high > 1e-3)):
-        middle = np.where(endless, LARGEST_H_OMEGA, (low + high) / 2)
-        stable = radius(middle) <= 1 + slack
-        low, high = np.where(stable & ~endless, middle, low), np.where(stable, high, middle)
-        high[endless] = np.inf
-    some = high > 1e-3
-    below = np.where(endless, LARGEST_H_OMEGA, np.maximum(low - RESOLVED, 1e-9))
-    decays = radius(np.where(some, below, 1.0)) <= 1 - slack
-    return np.where(some, np.where(decays, np.where(endless, np.inf, low), nan), 0.0)
-
-
-def limits(scheme: str, frictions: Floats) -> Floats:
-    """The largest h omega at which the law of a scheme is stable, at frictions over omega (n,)."""
-    with np.errstate(all="ignore"):
-        return last_stable(lambda turns: law_at(scheme, turns, frictions).growth, len(frictions), 1e-9)
-
-
 def _limit_of_engine(label: Label, friction: float) -> float:
     """The same of an engine's own map."""
     try:
@@ -169,13 +130,6 @@ def _limit_of_engine(label: Label, friction: float) -> float:
     except MethodError:
         return nan
     return float(found[0])
-
-
-def curve(scheme: str, turns: Floats, of: str) -> Floats:
-    """The law's temperature at these h omega, NaN where the step is unstable."""
-    with np.errstate(all="ignore"):
-        found = np.asarray(getattr(law_at(scheme, turns, RATE), of))
-    return np.where(np.isfinite(found), found, nan)
 
 
 def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:
@@ -192,9 +146,3 @@ def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[H
 def perform(options: Namespace, progress: Progress | None) -> Sampling:
     """Carry out `springcheck sampling`."""
     return record(options.output or "sampling.h5", options.method, **keeper.how(options, progress))
-
-
-@keeper.restoring("sampling")
-def stored(kept: keeper.Kept) -> Sampling:
-    """The study that `record` has saved.  StoreError where the file holds none."""
-    return Sampling(methods=kept.listed(SAMPLED, "methods"), left_out=kept.left_out, path=kept.path)

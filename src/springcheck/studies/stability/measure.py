@@ -104,10 +104,3 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
     scene = scenefile.load_scene(options.scene)
     path = options.output or f"{scene.name}-stability.h5"
     return record(scene, path, options.method, **keeper.how(options, progress))
-
-
-@keeper.restoring("stability")
-def stored(kept: keeper.Kept) -> Stability:
-    """The study that `record` has saved.  StoreError where the file holds none."""
-    scene, found = keeper.stored_scene(kept.path), kept.listed(LIMITS, "methods")
-    return Stability(scene=scene, limits=found, left_out=kept.left_out)

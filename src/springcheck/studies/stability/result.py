@@ -1,17 +1,19 @@
-"""Result of a study of stability: limits, failures, the table, and the stored form."""
+"""Result of a study of stability: limits, failures, tables, the chart, and the stored form."""
 
 from __future__ import annotations
 
-from argparse import Namespace
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from springcheck import engines
+from springcheck import engines, schemes
 from springcheck.errors import MethodError
-from springcheck.figures.views import units
+from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
+from springcheck.figures.looks import scheme_of, title
+from springcheck.figures.naming import labelled
+from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.keeper import document
@@ -19,7 +21,6 @@ from springcheck.studies.stability import propagators
 from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
-from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count, rounded_down
 
@@ -62,12 +63,26 @@ class Limit:
         """The limit in the most digits known: the stated one where everything agrees."""
         return self.theory if self.follows and self.stated else self.limit
 
+    @property
+    def line(self) -> str:
+        """The limit in words."""
+        return f"{self.method}: limit of h w {_steps([self.best])[0]}"
+
+
+LIMITS: RecordForm[Limit] = RecordForm(
+    kind=Limit, beginning="stability/limits/", signal="radius", axes=("h_w",),
+    auxiliary=("radius_predicted",), log=("h_w", "radius"), line=lambda found: found.line,
+)  # fmt: skip
+"""A table for each method."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Stability(Studied):
     """All limits, and the methods left out and why; a row of its table is a method's limit."""
 
     table_of: ClassVar[str] = "methods"
+    forms: ClassVar = {"limits": LIMITS}
+    piece: ClassVar[str] = "measurement"
 
     scene: Scene
     limits: tuple[Limit, ...]
@@ -107,48 +122,76 @@ class Stability(Studied):
             return np.nan
         return longest(propagators.scheme_of(label), self.scene, None if found.follows else found.limit)
 
-    @property
-    def said(self) -> str:
-        """The limits in words: how many methods are stable up to which h w."""
-        limits = [x.best for x in self.limits]
-        never, always = limits.count(0.0), limits.count(np.inf)
-        some = sorted({x for x in limits if 0 < x < np.inf})
-        parts = [f"{count(limits.count(x), 'method')} up to {rounded_down(x, 4)}" for x in some[:3]]
-        parts += [f"{len(some) - 3} other limits"] if len(some) > 3 else []
-        parts += [f"{always} always"] if always else []
-        return ", ".join([*parts, f"{never} never"] if never else parts)
+    def said(self, *, short: bool = False) -> str:
+        """Limits, each with its scheme, or in `short` and of several schemes with the number of methods."""
+        found: dict[float, list[Limit]] = {}
+        for x in sorted(self.limits, key=lambda x: (x.best == 0, x.best)):
+            found.setdefault(x.best, []).append(x)
+        parts = []
+        for limit, some in found.items():
+            titles = {title(schemes.scheme(scheme_of(x.method)).name) for x in some}
+            who = count(len(some), "method") if len(titles) > 1 else titles.pop()
+            named = _steps([limit], "never", "always", 4)[0]
+            parts.append(f"{named} ({len(some) if short else who})")
+        return ", ".join(parts)
 
-    def lines(self, options: Namespace | None = None) -> Lines:
+    @property
+    def title(self) -> str:
+        return f"{self.scene.title}: limits of stability"
+
+    def answer(self) -> Lines:
+        return [plain(f"Largest stable h w on a spring: {self.said()}")]
+
+    def tables(self) -> Lines:
         scene, w = self.scene, fastest(self.scene)
-        t_unit = units(scene).t
-        h_w = f"h w = {abs(scene.step) * w:.4g}, w = {w:.6g} the largest angular frequency"
         rows, beyond = [], []
         for x in self.limits:
             largest = self.largest(x)
             cells = (x.method, *_steps([x.best, x.theory]), *_steps([largest], none="none", every="any"))
             rows.append([plain(cell, "" if x.follows and x.stated else "bold red") for cell in cells])
             beyond += [x.method] if largest < abs(scene.step) else []
-        fits = "The scene's step is within the limit of every method." if rows else ""
-        warned = f"The scene's step is too long for {', '.join(beyond)}." if beyond else fits
+        fits = "It is within the limit of every method." if rows else ""
+        warned = f"It is too long for {', '.join(beyond)}." if beyond else fits
+        h_w = f"h w = {abs(scene.step) * w:.4g}, w = {w:.6g} the largest angular frequency"
+        titles = ("method", "limit of h w", "in theory", with_unit("largest step", units(scene).t))
+        small = [plain("Largest steps are those of small oscillations.", "dim")]
         return [
-            plain(f"{scene.title}: limits of stability", "bold"),
-            plain(f"Stable on a spring: {self.said}"),
-            *resumed(self.resumed, "measurement"),
-            plain(),
-            table(
-                ("method", "limit of h w", "in theory", f"largest step{f' ({t_unit})' * bool(t_unit)}"), rows
-            ),
+            table(titles, rows),
             plain(),
             plain(f"The scene's step h = {scene.step:g} has {h_w}."),
             plain(warned, "bold yellow" if beyond else ""),
-            *(
-                []
-                if scene.system.is_linear
-                else [plain("Largest steps are those of small oscillations.", "dim")]
-            ),
+            *small * (not scene.system.is_linear),
             *(plain(line, "bold red") for line in self.failures),
-            *left_out(self.left_out),
         ]
+
+    def banks(self, **chosen: Any) -> list[Bank]:
+        """Spectral radius against h w: a line for each scheme, the measured radii of methods as marks."""
+        lines: dict[str, Curve] = {}
+        marks = []
+        for x in self.limits:
+            group, name = scheme_of(x.method), x.scheme.partition(":")[0]
+            lines.setdefault(x.scheme, Curve(name=name, group=group, x=x.h_w, y=x.radius_predicted))
+            marks.append(Curve(name=x.method, group=group, x=x.h_w, y=x.radius, line=False, marks=True))
+        if not marks:
+            return []
+        edges = sorted({x.best for x in self.limits if 0 < x.best < np.inf})
+        rules = [Rule(axis="y", at=1.0, look="one", name="growing above")]
+        rules += [Rule(axis="x", at=x, name=f"limit {rounded_down(x, 4)}") for x in edges]
+        here = abs(self.scene.step) * fastest(self.scene)
+        if here > min(x.h_w[0] for x in self.limits):
+            rules.append(Rule(axis="x", at=here, name="this scene", look="here"))
+        h_w = "h \N{GREEK SMALL LETTER OMEGA}"
+        chart = labelled(Chart(
+            title="Spectral radius of one step: lines in theory, marks as measured.",
+            x=Scale(name=f"step times frequency, {h_w}", log=True),
+            y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
+            curves=[*lines.values(), *marks], rules=rules,
+        ))  # fmt: skip
+        heading = f"Stable up to {h_w} (methods): {self.said(short=True)}"
+        return [
+            Bank(name="stability", title="Schemes (lines) and methods (marks)", heading=heading,
+                 charts=[chart], foot=f"{self.scene.title}: lines in theory, marks as measured")
+        ]  # fmt: skip
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON (a limit of None: there is none)."""
@@ -165,13 +208,8 @@ class Stability(Studied):
         )  # fmt: skip
 
 
-def _steps(values: Iterable[float], none: str = "never stable", every: str = "always stable") -> list[str]:
+def _steps(
+    values: Iterable[float], none: str = "never stable", every: str = "always stable", digits: int = 8
+) -> list[str]:
     words = {0.0: none, np.inf: every}
-    return ["-" if np.isnan(x) else words.get(x) or rounded_down(x) for x in values]
-
-
-LIMITS: RecordForm[Limit] = RecordForm(
-    kind=Limit, beginning="stability/limits/", signal="radius", axes=("h_w",),
-    auxiliary=("radius_predicted",), log=("h_w", "radius"),
-)  # fmt: skip
-"""A table for each method."""
+    return ["-" if np.isnan(x) else words.get(x) or rounded_down(x, digits) for x in values]
