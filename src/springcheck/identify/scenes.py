@@ -66,7 +66,7 @@ def of_scene(
         if said := other.found(Case(trajectory=replace(part, scheme=name), scene=scene, piece=True)):
             because = Explanation(f"{capital(title(name))} with another number: {said}", LOOK, local=True)
             return nothing([because], scene.n, notes=notes)
-    if not (alone and alone.fits and not found.fits):
+    if alone is None or found.fits or not (alone.fits or scene.system.is_separate):
         return found
     if scene.system.is_separate or alone.scheme is None:
         return alone
@@ -104,10 +104,7 @@ def diagnosis(scene: Scene, run: Trajectory, about: int, few: bool = False) -> s
         return ""
     elif first is None and run.scheme in (found.scheme, *found.aliases):
         return _of_its_own(scene, run, found)
-    elif first is None and run.scheme in names:
-        return ""
-    elif first is not None and not first.local:
-        # a guess that leaves something over, or none
+    elif not first.shown if first else run.scheme in names:
         return ""
     remedy = f". What to do: {first.remedy}" if first and first.remedy else ""
     return f"{first.cause if first else found.statement}{remedy}"

@@ -193,7 +193,7 @@ def on_scene(scene: Scene, run: Trajectory, notes: tuple[str, ...] = ()) -> Iden
             whose = either([title(name) for name in some])
             cause = f"The first steps are those of {whose} with the force of {scene.name}, later ones are not"
         remedy = "look at the scene's numbers; `springcheck judge` says where steps depart from a scheme"
-        return nothing([Explanation(cause, remedy)], scene.n, notes=notes)
+        return nothing([Explanation(cause, remedy, shown=bool(some))], scene.n, notes=notes)
     if found[0] in WRONG:
         because = Explanation(f"{found[0]}{steps}", WRONG_REMEDIES.get(found[0], COMPARE), local=True)
         return nothing([because], scene.n, notes=notes)
