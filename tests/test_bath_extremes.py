@@ -76,7 +76,7 @@ def seeded(where: Scene, label: str, seed: int) -> Seeded:
 
 def test_a_scheme_without_a_noise_of_real_size_is_refused() -> None:
     with pytest.raises(
-        MethodError, match=r"from friction \* step = 2 on it is no thermostat, and here that is 2.5"
+        MethodError, match=r"from friction \* step = 2 it is no thermostat, and friction \* step is 2.5"
     ):
         driver.run(scene(x=2.5), "own:gj-iii", seed=1)
 

@@ -34,12 +34,12 @@ BUDGETS = {
 
 TO_COME = {
     ("physics",): 3800,
-    ("physics/exact",): 1520,
+    ("physics/exact",): 1490,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4900,
-    ("identify",): 5640,
-    ("store",): 2670,
-    ("formats",): 1591,
+    ("identify",): 6080,
+    ("store",): 2655,
+    ("formats",): 1531,
     ("studies",): 6450,
     ("figures",): 2600,
     ("cli",): 3230,

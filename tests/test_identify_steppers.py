@@ -258,3 +258,15 @@ def test_a_step_that_is_another_scheme_backwards_is_told_with_both() -> None:
         found.statement
         == "A negative step is not semi-implicit-euler backwards but semi-implicit-euler-drift-kick"
     )
+
+
+def test_a_step_that_reverses_the_momentum_says_so() -> None:
+    """It said that the momentum changes by 1.374e+06 h F over a short step."""
+
+    def step(q: float, p: float, h: float, force: Force, mass: float) -> tuple[float, float]:
+        p += h / 2 * force(q)
+        q += h * p / mass
+        return q, -(p + h / 2 * force(q))
+
+    (first, *_) = identify_stepper(step).explanations
+    assert "momentum by -1" in first.cause

@@ -240,7 +240,7 @@ def test_other_scenes_are_reported_too(name: str, tmp_path: Path) -> None:
     content = page.gather(tmp_path / "a.h5")
     text = page.html(content)
     assert len(text.encode()) < 508_000
-    assert (content.data["linear"] is None) == ("does not compute the motion again" in text)
+    assert (content.data["linear"] is None) == ("Not computed again here: this page" in text)
     assert (content.data["spring"] is None) == (name != "lc-circuit")
 
 
@@ -250,8 +250,8 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
     content = page.gather(tmp_path / "a.h5")
     text = page.html(content)
     assert len(text.encode()) < 500_000
-    assert f"Every {content.stride}th stored frame" in text
-    assert "Every 22nd stored frame" in page.html(replace(content, stride=22))
+    assert f"every {content.stride}th stored frame" in text
+    assert "every 22nd stored frame" in page.html(replace(content, stride=22))
     assert all(run["every"] == content.stride for run in content.data["runs"])
 
 
@@ -354,7 +354,7 @@ def test_a_browser_gets_the_same_doubles(content: page.Content, opened: Any) -> 
     found, said = _checked(opened(content))
     assert found == "equal"
     assert "Your browser = this file: 3 of 4 methods to the last bit, 1 to rounding" in said
-    assert f"q and p the same doubles (201 frames): {', '.join(OWN[:3])}" in said
+    assert f"q and p equal bit for bit (201 frames): {', '.join(OWN[:3])}" in said
 
 
 def test_a_browser_gets_the_same_doubles_of_another_spring(tmp_path: Path, opened: Any) -> None:
@@ -374,7 +374,7 @@ def test_a_browser_sees_one_changed_bit(content: page.Content, opened: Any) -> N
     found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
     assert found == "differs"
     assert "own:semi-implicit-euler differs first in frame 150, t = 15" in said
-    assert "q and p the same doubles (201 frames): own:euler" in said
+    assert "q and p equal bit for bit (201 frames): own:euler" in said
 
 
 def test_a_browser_counts_the_frames_of_every_run(content: page.Content, opened: Any) -> None:
@@ -382,7 +382,7 @@ def test_a_browser_counts_the_frames_of_every_run(content: page.Content, opened:
     runs[0] |= {name: runs[0][name][:50] for name in ("t", "q", "p")}
     found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
     assert found == "equal"
-    assert f"q and p the same doubles (50, 201 frames): {', '.join(OWN[:3])}" in said
+    assert f"q and p equal bit for bit (50, 201 frames): {', '.join(OWN[:3])}" in said
 
 
 EVERY = ("own:*", "openmm:*", "ase:*", "sundials:*", "scipy:*")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import inspect
 import os
 import pydoc
+import re
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import matplotlib as mpl
@@ -13,9 +15,11 @@ import numpy as np
 import pytest
 
 import springcheck
+from springcheck.api import studies as api
 from springcheck.errors import SpringcheckError
 from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Comparison
+from springcheck.studies import STUDIES
 
 NAMES = [
     "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact",
@@ -30,6 +34,12 @@ def test_the_names_are_these_and_each_is_there() -> None:
         assert getattr(springcheck, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'integrate'"):
         springcheck.integrate  # noqa: B018
+
+
+def test_each_study_has_its_function_and_no_function_is_of_a_study_that_is_gone() -> None:
+    assert {study.name for study in STUDIES} <= set(NAMES)
+    used = set(re.findall(r"springcheck\.studies\.(\w+)", inspect.getsource(api)))
+    assert {name for name in used if find_spec(f"springcheck.studies.{name}") is None} == set()
 
 
 @pytest.mark.parametrize("name", ["simulate", "compare", "identify", "run", "precision", "report"])

@@ -123,11 +123,11 @@ steps = 5
 @pytest.mark.parametrize(
     ("right", "wrong", "said"),
     [
-        ("[[particle]]", "[particle]", "particle: there may be several of it: write [[particle]], in double"),
+        ("[[particle]]", "[particle]", "particle: write [[particle]], in double"),
         (
             "[[spring]]",
             "[spring]",
-            "spring: there may be several of it: write [[spring]], in double brackets",
+            "spring: write [[spring]], in double brackets",
         ),
         ("[time]", "[[time]]", "time: there is one of it: write [time], in single brackets, once"),
         (

@@ -11,9 +11,9 @@ import pytest
 
 import springcheck
 from springcheck.identify.catalogue import KNOWN_ELSEWHERE, of_scheme
+from springcheck.identify.elsewhere import ELSEWHERE
 from springcheck.identify.tables import unit
 from springcheck.schemes import SCHEMES
-from springcheck.schemes.elsewhere import ELSEWHERE
 
 
 def stability(name: str, z: mpmath.mpf) -> mpmath.mpf:
@@ -42,7 +42,7 @@ def test_the_first_wrong_coefficient_is_that_of_the_order(name: str) -> None:
 @pytest.mark.parametrize("name", ELSEWHERE)
 def test_the_map_that_identify_compares_is_of_that_order(name: str) -> None:
     errors = []
-    for x in (0.04, 0.02):
+    for x in (0.04, 0.02) if ELSEWHERE[name].order < 8 else (0.2, 0.1):
         wide = np.longdouble(x)
         found = unit(of_scheme(name), np.array([wide * wide], np.longdouble), np.zeros(1, np.longdouble))[0]
         flow = np.array([[np.cos(wide), np.sin(wide) / wide], [-wide * np.sin(wide), np.cos(wide)]])

@@ -283,7 +283,7 @@ def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need
     assert [x.method for x in study.limits] == ["own:velocity-verlet"]
     (left,) = study.left_out
     assert left.method == "openmm:verlet"
-    assert "a program's spring pulls alike along every axis" in left.reason
+    assert "one stiffness along every axis" in left.reason
 
 
 def test_what_is_left_out_is_named_once() -> None:

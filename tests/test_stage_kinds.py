@@ -61,7 +61,7 @@ def test_kinds_are_named_in_the_table_and_by_schemes_alone() -> None:
         if isinstance(node, ast.Constant) and node.value in telling
     }
     assert {name for name in named if not name.startswith(("identify/", "bath/"))} == {
-        "schemes/kinds.py", "schemes/catalogue.py", "schemes/elsewhere.py",
+        "schemes/kinds.py", "schemes/catalogue.py",
         # of thermostats, and what the page's loops carry out
         "checks/stages.py", "cli/page/given.py",
     }  # fmt: skip

@@ -252,7 +252,7 @@ def test_a_friction_that_hardly_shows_is_no_number_and_kt_none_beside_it() -> No
     )  # fmt: skip
     made = driver.run(weak, "own:baoab", seed=3)
     said = " ".join(identify(made.t, made.q, v=made.p / M, mass=M).notes)
-    assert "friction c/m too little known to tell kT from it" in said
+    assert "friction c/m too uncertain to determine kT" in said
 
 
 def test_two_oscillators_in_one_bath_are_named_and_joined_ones_are_not() -> None:

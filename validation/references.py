@@ -30,6 +30,7 @@ import mpmath as mp
 import numpy as np
 
 from arguments import script
+from springcheck.errors import SpringcheckError
 from springcheck.physics import exact, scenefile, terms
 from springcheck.physics.scene import Scene
 
@@ -166,6 +167,8 @@ def over_length(key: str, n: dict[str, int], square: Series) -> Series:
         x = square.power(-1) * (n["diameter"] ** 2 >> BITS)
         x = x * x * x
         return (x + x * x * (-2 << BITS)) * square.power(-1) * (24 * n["depth"])
+    if key != "radial-morse":
+        raise SpringcheckError(f"add the law of {key} to over_length")
     e = (square.power(0.5).shift(-n["rest"]) * -n["steepness"]).exp()
     return (e + e * e * -(1 << BITS)) * square.power(-0.5) * n["steepness"] * (2 * n["depth"])
 

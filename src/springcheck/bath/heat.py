@@ -1,4 +1,4 @@
-"""Temperatures of a run in a bath, measured, beside those of its scheme."""
+"""Temperatures of a run in a bath, measured, next to those of its scheme."""
 
 from __future__ import annotations
 

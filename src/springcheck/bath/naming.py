@@ -1,4 +1,4 @@
-"""Which thermostat made the frames of an oscillator: a scheme is a row with a covariance beside its map.
+"""Which thermostat made the frames of an oscillator: a scheme is a row with a covariance next to its map.
 
 One step is z' = A z + G xi.  The best map of the frames and the covariance of what it leaves are measured
 once (`noise_of`).  A row has two free numbers, a = (h w)**2 and x = gamma h, and its best kT in closed form;

@@ -30,7 +30,7 @@ class Stepper:
 
     @classmethod
     def of(cls, scheme: Thermostat, scene: Scene, *, width: Any = np.longdouble, **more: Any) -> Stepper:
-        """The steps of a scheme on a scene with a bath."""
+        """The stepper of a scheme for a scene with a bath."""
         assert scene.bath is not None
         return cls(
             scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal, width=width,

@@ -108,7 +108,7 @@ def explained(
 ) -> list[Verdict]:
     """The verdicts, the first failed one with its cause appended, by the states around its first step off.
 
-    `shown(scene, run, frame, few)` is that sentence, "" where the states show nothing; if few steps are off
+    `shown(scene, run, frame, few)` is that sentence, "" where the states show nothing; if few steps are wrong
     it is of these alone.
     """
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)

@@ -111,7 +111,7 @@ def draws_variance(case: Case) -> Chance:
 
 @check("indep", family="noise", requires={"every-step"})
 def draws_independent(case: Case) -> Chance:
-    """The draws depend on nothing before them: their mean is 0, whatever the draw, momentum and force before.
+    """The draws are independent: their mean is 0 whatever the previous draw, momentum and force were.
 
     A drag that is not that of the noise, a wrong force, or noise by place leaves a part of it in each draw.
     """

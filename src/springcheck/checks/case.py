@@ -40,7 +40,7 @@ class Case(Claim):
 
     @cached_property
     def clocked(self) -> Case:
-        """The case with a clock beside the particles, which shows the time of each frame; itself where no
+        """The case with a clock next to the particles, which shows the time of each frame; itself where no
         force depends on the time."""
         if not self.scene.system.is_driven:
             return self
@@ -244,7 +244,7 @@ class Case(Claim):
         """Accumulated rounding of so many steps, in the coordinates in which a step is a rotation and in
         allowances of a step (f,); infinite but for kicks and drifts in double precision without friction.
 
-        Roundings of states are as good as random and add up as a random walk: 5 standard deviations of one
+        Roundings of states are effectively random and add up as a random walk: 5 standard deviations of one
         unit each.  A coefficient is rounded once, so that its error is the same in every step: one for the
         kick and one for the drift, each of which turns the phase by h w, and one for the factor of the whole
         state, near 1, where there is one.  A closed form that rounds like the engine is no walk.  `turn`
@@ -303,12 +303,12 @@ def strongest(parts: tuple[Term, ...], q: Reals) -> Reals:
 
 
 def overflows(how: Arithmetic) -> str:
-    """Reason of steps that are off because their forces overflow a fixed-point sum."""
+    """Reason of steps that are wrong because their forces overflow a fixed-point sum."""
     return f"fixed-point sum of forces overflows beyond 2**{np.log2(how.overflow):g}"
 
 
 def keeps(how: Arithmetic) -> str:
-    """Reason of steps that are off because an engine reused a force that it had computed before."""
+    """Reason of steps that are wrong because an engine reused a force that it had computed before."""
     return f"forces are reused while no position moves by more than {how.stale:g}"
 
 
@@ -331,7 +331,7 @@ def too_strong(case: Case) -> str:
 
 
 def small_move(run: Trajectory) -> str:
-    """A sentence where some step moves so little that the engine reuses a kept force; "" elsewhere."""
+    """A sentence where some step moves so little that the engine reuses a stored force; "" elsewhere."""
     how = run.arithmetic
     if how.stale and run.every == 1 and len(run.q) > 1:
         moved = np.max(np.abs(np.diff(run.q, axis=0)), axis=1)

@@ -40,7 +40,7 @@ class Finding(NamedTuple):
     why: str
     sees: Limits = NOT_KNOWN
     holds: bool = True
-    """A further condition of a pass, beside the value within its bound."""
+    """A further condition of a pass, next to the value within its bound."""
 
 
 class Chance(NamedTuple):
@@ -139,8 +139,8 @@ def check(
 ) -> Callable[[Judge], Check]:
     """Make a check of a function, with its name and the first sentence of its docstring.
 
-    Without `telling`, every check distinguishes schemes except those of facts and repetitions.  ValueError
-    for a requirement that is not in the table.
+    `telling` states whether it distinguishes schemes; by default all do but those of records and repetitions.
+    Raises ValueError for an unknown requirement.
     """
     if unknown := sorted(set(requires) - set(REQUIREMENTS)):
         raise ValueError(

@@ -18,7 +18,7 @@ from springcheck.schemes import Law
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Claim:
-    """A trajectory, or a piece of it, and the scene that it is said to be of."""
+    """A trajectory, or a piece of it, and the scene that it is stated to be of."""
 
     trajectory: Trajectory
     scene: Scene

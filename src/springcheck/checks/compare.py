@@ -42,8 +42,9 @@ def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Ex
 def compare(
     scene: Scene, pieces: Mapping[str, Trajectory], known: tuple[Extended, Extended] | None = None
 ) -> Comparison:
-    """Compare trajectories, or pieces of them over the same frames, with each other and the exact one, which
-    is worked out unless it is `known` (`solution`)."""
+    """Compare trajectories, or pieces over the same frames, with each other and with the exact solution.
+
+    `known` is the exact solution if it has been computed (`solution`)."""
     norm = scene.system.norm
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
     if pieces and exact.has_true_motion(scene):

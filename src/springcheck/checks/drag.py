@@ -1,7 +1,7 @@
 """Friction, or its opposite, below the noise of velocities that are rebuilt from positions.
 
 An engine that takes its velocity from (x' - x)/h rounds it by eps x/h, which hides a friction of that size in
-every single step.  The noise is as good as random and a friction is not: the residuals of the steps are
+every single step.  The noise is effectively random and a friction is not: the residuals of the steps are
 summed along the momenta, sum d p, where a friction c adds -c h p**2 at every step and the noise its standard
 error.
 
@@ -60,7 +60,7 @@ def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None
 
 
 def _is_irregular(case: Case, steps: int) -> NDArray[np.bool_]:
-    """Whether the roundings of positions are as good as random within so many steps (n,).
+    """Whether the roundings of positions are effectively random within so many steps (n,).
 
     x' - 2x + x'' is a number of quanta of x, and h**2 a is rounded to it: what it loses comes back when h**2
     a has changed by a quantum.  Where that takes long it is no noise, and what is lost may be all of a force.

@@ -92,7 +92,7 @@ def _abscissae(case: Case) -> set[float]:
 
 def _off(case: Case, later: float, *, held: bool = False) -> Extended:
     """Distance of the particles from the scheme's step (2, f-1, n) where the time is taken later by a part of
-    a step, and is held over the stages."""
+    a step, and is constant over the stages."""
     run = case.trajectory
     q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
     q[:, -1] += later * np.longdouble(run.step)
@@ -128,7 +128,7 @@ def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
 def drive(case: Case) -> Finding | str:
     """The time of a drive is that at which the scheme takes it within its step.
 
-    The delay of all drives, in steps, by linear least squares over all steps.  Each residual may be off by
+    The delay of all drives, in steps, by linear least squares over all steps.  Each residual may be wrong by
     the scheme's roundings, which are added up with the worst signs.  Where no time and no other drive
     explains the states, the cause is not the drive.
     """

@@ -147,7 +147,7 @@ def reversibility(bench: Bench) -> Finding | str:
     steps = len(out.t) - 1
     case = Case(trajectory=out, scene=bench.scene)
     if out.outcome.status != "complete" or not steps:
-        return "the run did not come to its end"
+        return "the run did not finish"
     state: tuple[Reals, Reals] = (out.q[-1], -out.p[-1])
     if not np.isfinite(state).all():
         return Finding(np.inf, case.roundings, "roundings", ENDED)
@@ -258,7 +258,7 @@ def orientation(bench: Bench) -> Finding | str:
 
 @check("company", family="repeat", requires={"one-step", "explicit", "linear"})
 def company(bench: Bench) -> Finding | str:
-    """A livelier copy beside it, which acts on nothing of it, changes no number of the motion."""
+    """A livelier copy next to it, which acts on nothing of it, changes no number of the motion."""
     alone, scene, n = bench.trajectory, bench.scene, bench.scene.n
     steps = len(alone.t) - 1
     if steps < 1:

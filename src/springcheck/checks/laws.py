@@ -86,7 +86,7 @@ def _order(bench: Bench, scene: Scene, where: str) -> Finding | str:
 def fitted(
     h: Sequence[float], error: Sequence[float], floor: Sequence[float], *, second: int
 ) -> tuple[float, float, float]:
-    """Signed slope of log error on log h beside a term h**second: slope, standard error, and what errors
+    """Signed slope of log error on log h, with a term h**second: slope, standard error, and what errors
     of the size of `floor` can do to it."""
     x, size = np.array(h), np.maximum(np.array(error), 1e-300)
     fit = line(np.log(x), np.log(size), x**second)
@@ -200,7 +200,7 @@ def _is_short(bench: Bench, h: float) -> bool:
 
 
 def _drift(bench: Bench, h: float) -> tuple[float, float, float]:
-    """Mean relative drift of the shadow energy a step, its standard error, and what is implied."""
+    """Mean relative drift of the shadow energy per step, its standard error, and what is implied."""
     run = bench.once(ensemble(h))
     steps, change = drifts(ensemble(h), run)
     each = change[-1] / steps[-1]

@@ -73,7 +73,7 @@ def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
 
 @check("shadow", family="motion", requires=CLOSED)
 def shadow_energy(case: Case) -> Finding | str:
-    """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
+    """The scheme's own energy of each mode is conserved, or changes by its exact factor, to rounding."""
     run = case.trajectory
     form = schemes.invariant(case.law.propagator, h=run.step)
     turn = schemes.rotation(case.law.propagator)
@@ -148,7 +148,7 @@ def frequency(case: Case) -> Finding | str:
     shape = schemes.condition(case.law.propagator, case.w)[j]
     angle = bound[-1] * (wide / mode) * shape
     if angle >= 1:
-        return "rounding may be as large as the mode, which has no phase then"
+        return "rounding may be as large as the mode, which then has no phase"
     if angle >= abs(expected):
         return f"{STILL} the whole turn"
     limit = float(angle / abs(expected))

@@ -1,4 +1,4 @@
-"""The one number of a scene that is another than it should be where steps are off.
+"""The one number of a scene that is another than it should be where steps are wrong.
 
 Of each number the value is sought by which all steps are the scheme's own: Newton's method on the sum of
 squares of what the steps miss.

@@ -85,7 +85,7 @@ def noise_map(subject: Seeded) -> Finding | str:
     """One seed and two starts: the difference of the runs, which no noise reaches, is the scheme's map."""
     scene, scheme = subject.scene, subject.scheme
     if scheme.collides:
-        return "a collision leaves nothing of the difference of two momenta"
+        return "a collision replaces the momenta: nothing of their difference is left"
     if scheme.rescales:
         return "a factor of all momenta is of both starts: no map of their difference"
     if not scene.system.is_linear or scene.n > FEW:

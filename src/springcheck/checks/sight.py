@@ -1,12 +1,12 @@
 """Limits of detection: the least relative change of a stiffness, step or friction that a check reports.
 
-A run of an engine that is off by a fraction x departs from the right one by x D to first order, D the
+A run of an engine that is wrong by a fraction x departs from the right one by x D to first order, D the
 derivative of the scheme's own motion: taken here as the quotient of two such motions in extended precision.
 A check sees it where x D exceeds the bound, so its limit is the least bound/D. The engine's own roundings add
 to it, and fill a quarter of a bound at most: three limits fail for certain, and a tenth of one passes.
 
 Of several springs the limit is that of the least visible one among those that are visible at all: an error of
-all of them at once would be seen long before.
+all of them at once would be detected long before.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def limits(
     right: States, motions: Callable[[str], Sequence[States]], change: float, part: Part,
     coarse: Callable[[str], Sequence[States]] | None = None,
 ) -> tuple[Limits, dict[str, int]]:  # fmt: skip
-    """The limits of a check, and, by the name of a limit, how many are invisible where they are off by
+    """The limits of a check, and, by the name of a limit, how many are invisible where they are wrong by
     `LARGEST`.
 
     `motions(name)` are the right one with a parameter larger by `change`, one for each spring or friction,

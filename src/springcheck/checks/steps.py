@@ -41,7 +41,7 @@ def _step_defect(case: Case) -> Finding | str:
         return f"{run.every} steps lie between frames, and {no_leap}"
     bound, told = _allowed(case)
     if not np.any(told):
-        return "between two frames a rounding may grow to the whole motion"
+        return "between two frames a rounding may grow to the size of the motion"
     seen = np.where(told, _in_roundings(case, run.q[1:], run.p[1:]), 0)
     still = np.where(told, _in_roundings(case, run.q[:-1], run.p[:-1]), 0)
     off = ~(seen <= bound)
@@ -186,7 +186,7 @@ def seldom_off(case: Case) -> tuple[int, str]:
 
 
 def _where(case: Case, off: NDArray[np.bool_]) -> str:
-    """Where the first of the frames that are off (f-1,) is, and how many are."""
+    """The step of the first wrong frame, and the number of wrong frames (f-1,)."""
     if not np.any(off):
         return ""
     step, number = case.steps[int(np.argmax(off)) + 1], int(np.count_nonzero(off))
@@ -195,7 +195,7 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
 
 
 def _regularly(case: Case, off: NDArray[np.bool_]) -> str:
-    """How often runs of frames that are off (f-1,) begin, if it is regular."""
+    """How often runs of frames that are wrong (f-1,) begin, if it is regular."""
     return regularly(case.steps[1:][off & ~np.append(False, off[:-1])].tolist(), "step")
 
 
@@ -231,7 +231,7 @@ def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
-    """The limit of the engine's arithmetic that explains all steps that are off (f-1,), or ""."""
+    """The limit of the engine's arithmetic that explains all steps that are wrong (f-1,), or ""."""
     run, how, limit, does = case.trajectory, case.trajectory.arithmetic, "", ""
     if not np.any(off):
         return ""
@@ -275,7 +275,7 @@ def arithmetic(case: Case) -> Finding | str:
     named = case.trajectory.arithmetic
     plain = Arithmetic()
     if named.is_double and named.force <= plain.force and not named.quantum:
-        return "plain double precision: the step defect says it all"
+        return "plain double precision: the step defect covers it"
     case = case.clocked
     seen = case.once(_step_defect)
     if isinstance(seen, str):

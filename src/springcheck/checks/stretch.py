@@ -6,7 +6,7 @@ With A the allowance of one step (see `rounding`), s steps later it is at most t
 |D Phi^(s-1-i)| A(z_i), each degree of freedom by itself: in a norm over all of them a heavy body would
 hide a light one, and a bound by norms of single steps grows exponentially on a motion that merely turns.
 
-That takes all roundings for of one sign.  In double precision they are as good as random, and 5 standard
+That takes all roundings for of one sign.  In double precision they are effectively random, and 5 standard
 deviations are allowed, and one more, or the worst of the last step if that is less.  Three parts add up their
 variances:
 
@@ -60,7 +60,7 @@ WIDENED = 3.32
 chi-squared."""
 
 NUMBERS = 1 << 20
-"""Entries of states and tangent maps that are held in memory at a time: 16 MB, and a few times as much for
+"""Entries of states and tangent maps that are in memory at a time: 16 MB, and a few times as much for
 temporaries."""
 
 
@@ -245,7 +245,7 @@ def _in_width(case: Claim, q: Extended, p: Extended, steps: int, width: Any) -> 
 def _alike(case: Claim, before: Reals, after: Reals) -> Extended:
     """Roundings that recur step after step, in deviations: to one side, along the state, along its change.
 
-    Each of those to one side may be as large as possible; the others are as good as random.
+    Each of those to one side may be as large as possible; the others are effectively random.
     """
     one_side = 0 * before + _to_one_side(case)
     return np.stack([one_side, np.sign(before) / np.sqrt(3), np.sign(after - before) / np.sqrt(3)])
@@ -277,7 +277,7 @@ def _allowed(
     case: Claim, worst: Extended, last: Extended, spread: Extended, deviations: float, *, random: bool
 ) -> Extended:
     """Bound on the roundings of all steps, in those of one: the worst case, or so many standard deviations
-    beside the worst of the last step, or beside one more where they are as good as `random`."""
+    next to the worst of the last step, or next to one more where they are effectively `random`."""
     how = case.trajectory.arithmetic
     # a solver errs alike at every step, with its whole error in velocities that are rebuilt from positions
     alike = case.trajectory.rebuilds_velocity and case.law.has("implicit")

@@ -30,7 +30,7 @@ UNREAD = (
     ("source", "--from", ("-o", "--force", "--thorough", "--verdicts")),
     ("integrator", "--stepper", ("--mass", "--stiffness", "--friction", "--step", "--trajectory")),
 )
-"""An option, and those that its command does not read beside it."""
+"""An option, and those that its command does not read next to it."""
 
 
 class Parser(argparse.ArgumentParser):

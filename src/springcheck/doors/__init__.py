@@ -67,7 +67,7 @@ def bring_once(what: Brought) -> None:
 
 
 def bring(options: Namespace) -> None:
-    """Register the engines that the options name, so that their methods run beside the others.
+    """Register the engines that the options name, so that their methods run next to the others.
 
     `options.brought` hands them on to the processes that a study starts.  Raises MethodError, in one line,
     where one of them cannot be used.

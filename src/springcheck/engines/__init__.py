@@ -156,9 +156,10 @@ class Started:
         form = f"start(scene, method, label, step{', seed=seed' if seeded else ''})"
         begin = partial(self._engine.start, **seeded)
         self.simulation = guarded(label, begin, scene, self._method, label, scene.step, form=form)
-        if not callable(getattr(self.simulation, "advance", None)):
-            kind = type(self.simulation).__name__
-            raise EngineError(f"{label} failed: its start returned {kind}, which has no advance")
+        for name in ("advance", "force_calls"):
+            if not hasattr(self.simulation, name):
+                kind = type(self.simulation).__name__
+                raise EngineError(f"{label} failed: its start returned {kind}, which has no {name}")
 
     @property
     def origin(self) -> dict[str, str]:
@@ -236,8 +237,8 @@ def method(label: Label) -> Method:
 
 
 def _methods_meant(name: str, glob: str, bath: bool | None, every: bool) -> list[str]:
-    """The methods of an engine that a glob may match: unless `every` may, the default ones where it does not
-    name methods."""
+    """The methods of an engine that a glob may match: all if `every`, else the default ones unless the
+    glob names methods."""
     found, meant = engine(name), list[str]()
     for of_bath, methods in ((False, found.methods), (True, found.thermostats)):
         if bath in (None, of_bath):
@@ -310,7 +311,7 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return "it multiplies all momenta by one factor, and all initial momenta are 0"
     if of_bath and scene.bath and not scene.bath.friction * scene.step < of_bath.most:
         x = scene.bath.friction * scene.step
-        return f"from friction * step = {of_bath.most:g} on it is no thermostat, and here that is {x:.6g}"
+        return f"from friction * step = {of_bath.most:g} it is no thermostat, and friction * step is {x:.6g}"
     if scene.kind not in what.kinds:
         moved = " and ".join(PLURAL[kind] for kind in sorted(what.kinds))
         others = {kind for other in engine(label.engine).methods.values() for kind in other.kinds}

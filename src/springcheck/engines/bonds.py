@@ -136,8 +136,8 @@ def joints(scene: Scene, term: Term, origins: Floats) -> list[Tie]:
     if begun:
         which = " and ".join(map(str, next(iter(begun))))
         raise MethodError(
-            f"{scene.name}: a program's spring pulls alike along every axis and rests at one point; that of "
-            f"particle {which} does not"
+            f"{scene.name}: a program's spring has one stiffness along every axis and one rest point; that "
+            f"of particle {which} has not"
         )
     return found
 

@@ -172,7 +172,7 @@ class Engine:
     schemes: tuple[Scheme, ...] = ()
     """Schemes that are not in the catalogue."""
     atlas: tuple[str, ...] = ()
-    """Methods on platforms, as `method@platform`, that the atlas of extremes measures beside the methods."""
+    """Methods on platforms, as `method@platform`, that the atlas of extremes measures next to the methods."""
     squares_lengths: bool = False
     """Forces come from the lengths of bonds, roots of squares, and 1/m and 1/h are formed: half of the
     exponent range is left."""

@@ -31,7 +31,7 @@ GROUP = "springcheck.engines"
 
 OURS = "springcheck"
 MODULES = ("own", "ase", "lammps", "mujoco", "openmm", "scipy", "sundials")
-"""Our engines, each the ENGINE of the module beside this one."""
+"""Our engines, each the ENGINE of the module next to this one."""
 
 
 class Origin(NamedTuple):
@@ -136,7 +136,7 @@ def _checked(found: object, name: str = "") -> Engine:
         raise MethodError(f"it is of type {type(found).__name__}, not a springcheck.engines.Engine")
     _plain("its name", found.name)
     if name and found.name != name:
-        raise MethodError(f"it calls itself {found.name!r}, and its entry point {name!r}")
+        raise MethodError(f"its name is {found.name!r}, but that of its entry point is {name!r}")
     for what in ("start", "version", "arithmetic", "convention"):
         if not callable(getattr(found, what)):
             raise MethodError(f"its {what} is of type {type(getattr(found, what)).__name__}, not a function")

@@ -1,4 +1,4 @@
-"""Charts as plain data: what a study shows in figures (`render`) and in the report page beside its text.
+"""Charts as plain data: what a study shows in figures (`render`) and in the report page next to its text.
 
 The results of studies have them (`banks`).  Numbers are the stored doubles; `plain` makes of a bank
 what JSON can hold.
@@ -51,7 +51,7 @@ class Curve:
     line: bool = True
     marks: bool = False
     notes: Sequence[str] = ()
-    """Annotation of each point beside its numbers."""
+    """Annotation of each point next to its numbers."""
     open: Sequence[bool] = ()
     """Which points are estimates: these have hollow marks, all others filled ones."""
     title: str = ""
@@ -71,10 +71,10 @@ class Tiles:
     """A map over two axes of values: `rows` holds, for each y, an index into `kinds` for each x, or -1."""
 
     kinds: Sequence[tuple[str, str]]
-    """Name and shade of each: good, wild, limit, refused, wrong; or of sizes s0 to s6."""
+    """Name and shade of each: good, wild, limit, refused, wrong."""
     rows: Sequence[Sequence[int]]
     notes: Sequence[Sequence[str]] = ()
-    """Annotation of each tile beside its kind; none by default."""
+    """Annotation of each tile next to its kind; none by default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,13 +91,15 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Naming:
-    """The name of a curve where it is well separated, in its colour; at x = 1 beside the axes."""
+    """The name of a curve where it is well separated, in its colour; at x = 1 next to the axes."""
 
     text: str
     group: str
     x: float
     y: float
     """Fractions of the width and height of the axes."""
+    below: bool = False
+    """Whether it hangs below its point, inside the axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +134,7 @@ class Bank:
     on: Sequence[str] | None = None
     """Series drawn at first; all by default."""
     columns: int = 0
-    """Charts beside each other in a figure; by default as many as suit it."""
+    """Charts side by side in a figure; by default as many as suit it."""
     foot: str = ""
     """Small print below its figure."""
     size: tuple[float, float] | None = None

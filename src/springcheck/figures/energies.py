@@ -58,7 +58,7 @@ EMPTY = 1e3
 
 
 def energy(runs: Runs, exact: Exact) -> Bank:
-    """Energy over time, and below it how far it is from that of the exact motion on a logarithmic scale.
+    """Energy over time, and below it how far it is from that of the exact solution on a logarithmic scale.
 
     Without friction that is the initial energy; where friction acts and no closed form is known it is the
     initial one too, and the axis says so.  All in units of the scene's `energy_scale`.

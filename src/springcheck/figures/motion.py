@@ -1,4 +1,4 @@
-"""The exact solution beside runs: smooth for a line, at their own frames for their errors."""
+"""The exact solution next to runs: smooth for a line, at their own frames for their errors."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ SPLIT, CLOSE = 64, 20
 
 
 def true_motion(scene: Scene, runs: Sequence[Trajectory], points: int = SMOOTH) -> Motion | None:
-    """A smooth exact motion from the first frame of these runs to the last, None where none is known."""
+    """A smooth exact solution from the first frame of these runs to the last, None where none is known."""
     times = [np.abs(run.t[[0, -1]]) for run in runs]
     return smooth(scene, float(np.min(times)), float(np.max(times)), points)
 
 
 def smooth(scene: Scene, first: float, last: float, points: int = SMOOTH) -> Motion | None:
-    """A smooth exact motion between two times from the start [T], None where none is known."""
+    """A smooth exact solution between two times from the start [T], None where none is known."""
     if not exact.has_true_motion(scene):
         return None
     begin, end = (round(x / abs(scene.step)) for x in (first, last))

@@ -122,7 +122,7 @@ def is_store(path: Path) -> bool:
 def read(
     path: Path, columns: Sequence[str] = (), step: float | None = None, most: int | None = None
 ) -> dict[str, States]:
-    """Trajectories of any program's file by name: one, except from HDF5 (see `hdf5.read_hdf5`).
+    """The trajectories of any program's file, by name; one except in HDF5 (see `hdf5.read_hdf5`).
 
     `columns` names columns without names, as t, q, v; `step` is the time step of files that count steps
     alone.  Raises StoreError, in one line, where the file cannot be read, or lacks times or positions.

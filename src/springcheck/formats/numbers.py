@@ -10,16 +10,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError, nearest, plain
-from springcheck.formats.columns import (
-    Floats,
-    States,
-    is_rate,
-    kind,
-    kinds,
-    listed,
-    named,
-    split,
-)
+from springcheck.formats.columns import Floats, States, is_rate, kind, kinds, listed, named, split
 from springcheck.physics.arrays import roundoff
 
 STATES = "y", "u", "state", "states", "sol", "solution", "z"
@@ -34,13 +25,13 @@ def of_table(path: Path, found: Any, names: Sequence[str], step: float | None = 
 
 
 def states_of(
-    path: Path, arrays: Mapping[str, Any], names: Sequence[str] = (), step: float | None = None
-) -> States:
+    path: Path, arrays: Mapping[str, Any], names: Sequence[str] = (), step: float | None = None,
+    finite: bool = True,
+) -> States:  # fmt: skip
     """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
 
-    From MATLAB and Octave times may be (1, f) or (f, 1), and columns may stand in rows.  `names` select among
-    the arrays, and give the quantity of one whose name does not: ``t=clock,q=x,v=dx``; of a single array they
-    name the columns.
+    MATLAB and Octave write times as (1, f) or (f, 1), and may write columns as rows.  `names` select arrays
+    and state their quantities, as ``t=clock,q=x,v=dx``; for a single array they name the columns.
     """
     given = arrays
     first, *more = arrays.values() or [np.empty(0)]
@@ -80,12 +71,12 @@ def states_of(
         for name, a in numbers.items()
         if meant.get(name) == "m" and name not in columns
     ]
-    states = split(path, columns, roundoff(*(numbers[name] for name in columns)), step)
+    states = split(path, columns, roundoff(*(numbers[name] for name in columns)), step, finite)
     return replace(states, mass=masses[0]) if masses else states
 
 
 def _state_vector(arrays: Mapping[str, Any], step: float | None) -> tuple[Mapping[str, Any], float | None]:
-    """Arrays of which one holds positions and then velocities as q and v, and the time between frames."""
+    """Arrays with one state vector split into q and v, and the time between frames."""
     plain_ = {
         name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"
     }

@@ -18,7 +18,7 @@ from springcheck.formats.digits import SHOWN, fixed, number, roundoff
 COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
 MOST_LABELS = 1000
-"""Characters of a row in which labels stand beside numbers, as in ``t=0.1 x=0.2``."""
+"""Characters of a row in which labels stand next to numbers, as in ``t=0.1 x=0.2``."""
 
 
 class Lines:
@@ -175,7 +175,7 @@ def _bare(cell: str) -> str:
 
 
 def _plain(line: str) -> list[float] | None:
-    """The numbers of a row that `float` alone can parse, as most are: some four times as fast."""
+    """The numbers of a row that `float` can parse, as most are: four times as fast."""
     if ";" in line or "\t" in line or "_" in line:
         return None
     try:

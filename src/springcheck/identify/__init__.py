@@ -5,7 +5,7 @@ its sentence.  One score (`compare`, `arithmetic`) holds all rows against the ma
 measured (`record` with `clock` and `storage`, `measure`, `modes`).  `search` tries them, the simplest first.
 Where none is left, `explain` asks tables of causes: `repairs`, `frames`, `laws`, and the class of the map
 (`unknown`).  `say` (with `factors`) makes every sentence, `result` holds the answer; `report` leads through
-all of it.  Beside it stand `positions` for files without velocities, `bath`, `steps` for a scene whose force
+all of it.  Next to it stand `positions` for files without velocities, `bath`, `steps` for a scene whose force
 is known, `files` and `stepper` for what commands get.
 """
 

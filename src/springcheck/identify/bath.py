@@ -21,7 +21,7 @@ MOST = 8
 
 SURE, AGREES, UNKNOWN = 6.0, 1e-6, 3.0
 """Standard errors of what is sure, the relative difference that agrees, and the standard errors of a friction
-up to which it is no number, and kT none beside it."""
+up to which it is no number, and kT none next to it."""
 
 FREE_OF_NOISE = 1e-9
 """Part of a combination that is free of noise, relative to the noise, that double precision leaves."""
@@ -167,7 +167,7 @@ def _numbers(name: str, x: Fitted, m: float | None) -> str:
         numbers.append(("friction c/m", x.friction, x.friction_error))
         numbers.append(("kT/m" if m is None else "kT", x.thermal * scale, x.thermal_error * scale))
     each = [f"{word} {_measured(y, error)}" for word, y, error in numbers if math.isfinite(y)]
-    return f"{name}: " + ", ".join([*each, *["friction c/m too little known to tell kT from it"] * vague])
+    return f"{name}: " + ", ".join([*each, *["friction c/m too uncertain to determine kT"] * vague])
 
 
 def _rounded(x: float, error: float) -> float:

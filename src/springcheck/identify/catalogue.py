@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.identify.elsewhere import ELSEWHERE
 from springcheck.identify.rows import HALF, ONE, Formula, Row, flow, stability
 from springcheck.identify.tables import same
 from springcheck.schemes import SCHEMES, Scheme, matrix, roundings
-from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.text.wording import either
 
 EXPLICIT, IMPLICIT = "explicit friction in the force", "friction implicit in v"
@@ -70,6 +70,7 @@ EULER, LATE, VERLET, POSITION = (
 )  # fmt: skip
 PLACES: tuple[tuple[str, str, tuple[Any, ...]], ...] = (
     (EULER, "after the kick", (KICK, DECAY, DRIFT)),
+    (EULER, "before the kick", (DECAY, KICK, DRIFT)),
     (LATE, "after the kick", (DRIFT, KICK, DECAY)),
     (LATE, "before the drift", (DECAY, DRIFT, KICK)),
     (EULER, "implicit in the kick", (("implicit", ONE), DRIFT)),
@@ -135,10 +136,14 @@ FRICTION = (
     ),
 )  # fmt: skip
 
+MANY, FAR = 18, 1.0
+"""Stages from which on a map of a long step comes near many others, and largest (h w)**2 of these."""
+
 KNOWN_ELSEWHERE = tuple(
     Row(
         scheme=x.name, title=x.title, stages=x.stages, over=x.over, under=x.under if x.over else (ONE,),
         also=x.also, roundings=8 * max(len(x.over) + len(x.under), len(x.stages)),
+        most=FAR if len(x.stages) > MANY else 3600.0,
     )
     for x in ELSEWHERE.values()
 )  # fmt: skip
@@ -148,6 +153,7 @@ DAMPED_ELSEWHERE = tuple(
         free="friction", law=EXPLICIT if len(row.under) == 1 else IMPLICIT,
     )
     for row in KNOWN_ELSEWHERE
+    if len(row.stages) <= MANY
 )  # fmt: skip
 
 
@@ -173,6 +179,12 @@ def _unequal(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
     return x, 1 + 0 * a, -g * a - (1 - g) * a * x, 1 - (1 - g) * a
 
 
+def _stages(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
+    """RK4 whose stages take g times their steps."""
+    x, y = 1 - g * a / 2 + g**3 * a * a / 24, 1 - g * g * a / 6
+    return x, y, -a * y, x
+
+
 HELD = Row(
     scheme="held-force", title="Semi-implicit Euler with one force for several substeps", formula=_held,
     free="share", start=(0.5, 0.75, 0.3),
@@ -181,6 +193,8 @@ HELD = Row(
 
 PARAMETERS = (
     Row(scheme="theta", title="the theta method", formula=_theta, free="theta", start=(0.6, 0.8, 0.4)),
+    Row(scheme="stages", title="RK4 whose stages take other steps", formula=_stages, free="stages",
+        start=(0.02, 0.1, 0.4, 1.5, 2.5)),
     Row(scheme="newmark", title="Newmark's method, gamma 1/2", formula=_newmark, free="beta",
         start=(0.1, 0.2, 0.3)),
 )  # fmt: skip

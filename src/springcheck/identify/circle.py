@@ -8,8 +8,9 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
-RIGID, TURNED = 1e-3, 0.05
-"""Largest relative change of a rod's length, and smallest rotation by which it shows [rad]."""
+RIGID, TURNED, EXACT = 1e-3, 0.05, 1e-12
+"""Largest relative change of a rod's length, smallest rotation by which it shows [rad], and the change that
+rounding alone leaves."""
 
 MOST, FEWEST = 16, 8
 """Most particles that are looked at, and most frames that any circle fits."""
@@ -31,7 +32,11 @@ def on_a_circle(q: Floats) -> str:
             arm, bent = _arm(x[:, i])
             length, off = _kept(arm)
             # a straight path lies on a circle as well, and an orbit may without a rod, but does not turn back
-            if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(arm):
+            if (
+                off <= RIGID * bent
+                and bent >= TURNED**2 * length
+                and (off <= EXACT * length or _turns_back(arm))
+            ):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return f"particle {i} swings and {kept}"
     return ""

@@ -26,7 +26,7 @@ SINGLE = 2.0**-24
 
 @dataclass(frozen=True, kw_only=True)
 class Freedom:
-    """What a comparison leaves open beside a row's own numbers."""
+    """What a comparison leaves open next to a row's own numbers."""
 
     jitter: float = 0.0
     """Relative uncertainty of the interval, by which velocities scale."""
@@ -39,7 +39,7 @@ class Freedom:
     growing: bool = False
     """Whether friction may be negative."""
     bias: float = 0.0
-    """Standard error of the entries beside that of the fit."""
+    """Standard error of the entries next to that of the fit."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -182,8 +182,8 @@ def _matches(
     damped = compiled.damped[r]
     good &= free.growing | ~damped | (x[1] > 0).astype(bool)
     # polynomials of many stages take any value far beyond their limit
-    open_ended = np.array([y.damped and y.formula is None and len(y.under) == 1 for y in rows])
-    good &= ~open_ended[r] | (np.abs(x[0]) <= BEYOND).astype(bool)
+    far_off = [BEYOND if y.damped and y.formula is None and len(y.under) == 1 else y.most for y in rows]
+    good &= (np.abs(x[0]) <= np.array(far_off)[r]).astype(bool)
     best: dict[tuple[int, int], tuple[Any, int]] = {}
     for i in np.flatnonzero(good).tolist():
         unsure = free.scale and not free.prior and freedom[i] < 3

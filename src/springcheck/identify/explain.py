@@ -13,7 +13,7 @@ from springcheck.identify.laws import law, of_a_solver
 from springcheck.identify.measure import Map, measure
 from springcheck.identify.repairs import EXCHANGED, FALLS, REPAIRS, turned
 from springcheck.identify.result import Explanation
-from springcheck.identify.shapes import SOLVED, limited, sine, solved
+from springcheck.identify.shapes import SOLVED, accumulates, limited, not_opposite, other_times, sine, solved
 from springcheck.identify.unknown import kind_of_map
 
 if TYPE_CHECKING:
@@ -95,6 +95,10 @@ def explain(seen: Seen, again: Callable[[Record, Seen], Identification] | None) 
         kind = kind_of_map(m)
         none = "One linear map explains the states, but it is none of the known schemes'"
         return [Explanation(kind or none, COMPARE)]
+    stiff = None if seen.stiffness is None or record.mixed else float(seen.stiffness[j])
+    found = not_opposite(record, seen.moving) or other_times(record, j, m, stiff) or accumulates(record, j)
+    if found:
+        return [found]
     found = bad_frames(record, m, j) or law(seen.maps, m, record.jitter)
     vague = not found.shown or found.cause.startswith("Noise")
     return [(_solved(record, m) if vague else None) or found]

@@ -171,8 +171,8 @@ def identify_file(
 
 
 def of_springs(told: Identification, q: Floats | None, *, stated: bool) -> Identification:
-    """An identification of states with positions q (f, N), which says so where these keep to a circle as on a
-    rod, unless springs are `stated` and fit.  Raises IdentificationError."""
+    """The identification of states with positions q (f, N), which reports positions on a circle, as on a rod,
+    unless springs are `stated` and fit.  Raises IdentificationError."""
     if told.verdict != "none" or q is None:
         return told
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""Runs of bad frames beside one map, as a table: what has happened there, in a sentence."""
+"""Runs of bad frames next to one map, as a table: what has happened there, in a sentence."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def whose(record: Record, m: Map) -> str:
 
 
 def bad_frames(record: Record, m: Map, j: int) -> Explanation | None:
-    """A few bad pairs beside one map."""
+    """A few bad pairs next to one map."""
     kept, found = _good_pairs(record, m, j)
     off, n = np.max(np.abs(found.left), 1) / m.base, len(m.unit)
     bad = np.flatnonzero(~kept)

@@ -114,7 +114,7 @@ def _is_flow(row: Any) -> bool:
 
 
 def _held(s: int, n: int, bend: float, loss: float) -> tuple[float, ...]:
-    """Of a force that is held: det = 1 + a (1 - g)."""
+    """Of a force that stays constant: det = 1 + a (1 - g)."""
     a = bend * math.exp(loss / 2) + (1 - math.exp(loss / 2)) ** 2
     return s, n, a, 1 - math.expm1(loss) / a if a else 0.5
 

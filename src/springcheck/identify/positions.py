@@ -14,7 +14,7 @@ from springcheck.identify.compare import Freedom, Joint, Match, compare
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation, Identification, nothing
 from springcheck.identify.rows import Row
-from springcheck.identify.say import answer
+from springcheck.identify.say import answer, of_another_friction
 from springcheck.identify.search import FEW, explained
 from springcheck.identify.seeing import see
 from springcheck.identify.unknown import kind_of_map
@@ -52,14 +52,20 @@ def identify_positions(
     free = Freedom(jitter=record.jitter)
     strides = FEW if seen.stride is None or seen.stride < 1 else range(seen.stride, seen.stride + 1)
     joints: list[Joint] = []
+    others: list[Joint] = []
     for rows, steps in (*((PLAIN, s) for s in strides), *((FRICTION, s) for s in strides)):
         if joints or (rows is FRICTION and friction == 0):
             break
         found = compare(seen.maps, free, [_shown(row, steps) for row in rows], range(1, 2))
-        joints = [x for x in found if seen.off(x) <= 0 and seen.rubs(x) <= 0 and explained(seen, x)]
-        joints = [
-            replace(x, stride=steps, parts=tuple(_of_a_step(y, steps) for y in x.parts)) for x in joints
+        good = [
+            replace(x, stride=steps, parts=tuple(_of_a_step(y, steps) for y in x.parts))
+            for x in found
+            if seen.off(x) <= 0 and explained(seen, x)
         ]
+        joints = [x for x in good if seen.rubs(x) <= 0]
+        others = others or good
+    if not joints and others and seen.stiffness is not None:
+        return of_another_friction(seen, others)
     if not joints:
         return _none(seen.maps[0].excess, kind_of_map(seen.maps[0]), len(seen.maps))
     names = list(dict.fromkeys(x.row.scheme for x in joints))

@@ -19,6 +19,7 @@ from springcheck.identify.result import Identification, nothing
 from springcheck.identify.say import either_way, said, unnamed
 from springcheck.identify.search import Seen, search
 from springcheck.identify.seeing import see
+from springcheck.identify.uneven import of_uneven
 
 CLEAN, FEWEST_LATE, HALF_A_STEP_AGO = 64.0, 12, "half a step ago"
 """Excess of a map that is rounding, fewest frames that show a late start, and the law that has it."""
@@ -38,6 +39,8 @@ def identify_arrays(
     IdentificationError where the states cannot show a map: too few, not finite, at rest, at uneven times, or
     not spanning the plane.
     """
+    if uneven := of_uneven(times_of(t), q, p, v, mass, stiffness):
+        return uneven
     if p is None and v is None:
         return identify_positions(read(t, q, None, np.zeros(np.shape(q)), mass), stiffness, friction, step)
     stated: dict[str, Any] = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}

@@ -55,6 +55,8 @@ class Row:
     from positions: "mean", "later", "earlier"."""
     inner: Row | None = None
     """Of a view, the row that is recorded so."""
+    most: float = 3600.0
+    """Largest |a| that is tried."""
     steps: int = 1
     """Steps of which the map is one."""
 

@@ -12,11 +12,11 @@ import numpy as np
 from springcheck.identify import factors
 from springcheck.identify.catalogue import FAULTS, HELD, OLD_FORCE, aliases, capital, title, titles
 from springcheck.identify.compare import Joint
+from springcheck.identify.elsewhere import ELSEWHERE
 from springcheck.identify.result import UNTOLD, Candidate, Explanation, Identification, nothing
 from springcheck.identify.search import FEW, Found, Round, Seen
 from springcheck.identify.tables import same
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, kind_of_map
-from springcheck.schemes.elsewhere import ELSEWHERE
 
 T = TypeVar("T")
 
@@ -92,7 +92,7 @@ def said(seen: Seen, found: Found, one: Round) -> Identification:
     first = joints[0]
     if first.row.fault:
         return _of_a_fault(seen, joints)
-    if first.row.free in ("theta", "beta"):
+    if first.row.free in ("theta", "beta", "stages"):
         return _of_a_parameter(seen, first)
     if one.growing:
         rate = first.parts[0].g * first.stride / float(seen.record.interval)
@@ -109,7 +109,7 @@ def said(seen: Seen, found: Found, one: Round) -> Identification:
     ):
         return _on_another_spring(seen, found)
     if seen.friction is not None and not any(seen.agrees(x) for x in joints):
-        return _of_another_friction(seen, joints)
+        return of_another_friction(seen, joints)
     return _named(seen, found)
 
 
@@ -183,7 +183,7 @@ def _on_another_spring(seen: Seen, found: Found) -> Identification:
     )  # fmt: skip
 
 
-def _of_another_friction(seen: Seen, joints: list[Joint]) -> Identification:
+def of_another_friction(seen: Seen, joints: list[Joint]) -> Identification:
     """Schemes that fit with another friction than the stated one, or in other steps."""
     first, m = joints[0], seen.record.mass
     if seen.stride is not None and not any(x.stride == seen.stride for x in joints):
@@ -196,7 +196,12 @@ def _of_another_friction(seen: Seen, joints: list[Joint]) -> Identification:
     elif not seen.friction:
         cause = f"{whose}, but with a friction, c = {c:.6g} where 0 is stated"
     else:
-        cause = f"{whose}, but with a friction {c / seen.friction:.4g} times the stated"
+        share = c / seen.friction / (first.parts[0].g * first.stride)
+        every = sorted(share * x.parts[0].g * x.stride for x in joints)
+        digits = 4 if every[-1] - every[0] < 1e-4 * every[0] else 3
+        low, high = (f"{every[i]:.{digits}g}" for i in (0, -1))
+        times = low if low == high else f"{low} to {high}"
+        cause = f"{whose}, but with a friction {times} times the stated"
     remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
     return _refuted(seen, Explanation(cause, remedy, local=True))
 
@@ -210,7 +215,12 @@ def _of_other_steps(seen: Seen, joints: list[Joint]) -> Explanation:
 
 
 def _of_a_parameter(seen: Seen, x: Joint) -> Identification:
-    part = x.parts[0]
+    part, h = x.parts[0], abs(float(seen.record.interval)) / x.stride
+    if x.row.free == "stages":
+        twice = abs(part.g / h - 1) < 1e-6
+        how = "h twice in its stages: they take h**2 k, not h k" if twice else (
+            f"stages of {part.g:.6g} times their steps")  # fmt: skip
+        return _refuted(seen, Explanation(f"RK4 with {how}", COMPARE, local=True))
     method = f"{x.row.title} with {x.row.free} = {part.g:.6g}"
     cause = f"{ONE_MAP}: if every step was recorded, {MAP_OF}{method}"
     return _refuted(seen, Explanation(cause, "", local=True))
@@ -281,7 +291,7 @@ def _of_the_law(candidates: tuple[Candidate, ...]) -> tuple[str, ...]:
 
 
 def _held(x: Joint) -> str:
-    """Words for a held force, with its number of substeps; "" where it is held over a whole step."""
+    """Words for a constant force, with its number of substeps; "" where it is constant over a whole step."""
     share, error = x.parts[0].g, 12 * x.parts[0].g_error + 1e-9
     off = abs(2 * share - 1)
     if off < max(error, 1 / 64):

@@ -57,7 +57,7 @@ WEAK = "damped elsewhere"
 """The group of two free numbers and many stages that fits some map on some spring by chance."""
 
 STAND_TOGETHER = 4
-"""Rounds whose hypotheses stand beside each other in files of few digits."""
+"""Rounds whose hypotheses stand side by side in files of few digits."""
 
 OF_DOUBLE = tuple(ROUNDS[i] for i in (0, 2, 3, 4, 1, *range(5, len(ROUNDS))))
 """The same for double precision, where a row that leaves friction open needs more than one that does not."""
@@ -137,6 +137,8 @@ def chosen(x: Joint) -> bool:
             n = 1 / off if off > 1 / 64 - room else math.inf
             whole = abs(off - 1 / round(n)) <= 2 * room if n < 1e3 and round(n) else False
             ok = ok and n < 1e3 and 2 <= round(n) <= 64 and whole
+        elif x.row.free == "stages":
+            ok = ok and part.g > 0 and abs(part.g - 1) > room and room < 1e-4
         elif x.row.free in ("theta", "beta"):
             near = abs(part.g * 1200 - round(part.g * 1200)) < 1200 * max(room, 1e-7)
             ok = ok and 1e-3 < part.g <= 1 and near and room < 1e-4

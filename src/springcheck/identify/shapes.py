@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck.identify.catalogue import capital, distinct, title
 from springcheck.identify.compare import Freedom, compare, distance
-from springcheck.identify.measure import Map
+from springcheck.identify.measure import Map, least_squares
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
@@ -19,6 +19,9 @@ from springcheck.schemes import SCHEMES, Scheme, step
 
 FEWEST_AT_LIMIT = 4
 """Frames that have to lie at one largest value for it to be a limit."""
+
+FAR_TIMES = 3.0
+"""Ratio of the interval to the steps from which on the times are wrong, whatever the scheme."""
 
 SOLVED = 1e-4
 """Largest error of an implicit step that is solved to a tolerance, relative to the state."""
@@ -53,7 +56,7 @@ def without_force(record: Record, j: int) -> Explanation | None:
     v = record.v[:, j].astype(float)
     known = np.column_stack([v[:-1], np.ones(len(v) - 1)])
     left = v[1:] - known @ np.linalg.lstsq(known, v[1:], rcond=None)[0]
-    room = 64 * ROUNDING * float(np.max(np.abs(v))) + 4 * float(np.max(record.dv[:, j]))
+    room = 1e-12 * float(np.max(np.abs(v))) + 4 * float(np.max(record.dv[:, j]))
     if len(v) < 8 or np.max(np.abs(left)) > room or not np.ptp(v) > 16 * room:
         return None
     cause = "The velocity does not depend on the position: no force of a spring acts on it"
@@ -134,12 +137,64 @@ def _strength(
 
 def solved(m: Map, jitter: float) -> Explanation | None:
     """An implicit scheme whose equation is solved to a tolerance: far nearer than any other scheme."""
-    near = compare([m], Freedom(jitter=jitter), distinct("plain"), range(1, 2), far=True)
-    off = sorted((distance(m, x.parts[0]), x.row.scheme) for x in near)
-    if len(off) < 2 or off[0][1] not in SCHEMES or not SCHEMES[off[0][1]].has("implicit"):
+    rows = (*distinct("plain"), *distinct("elsewhere"))
+    near = compare([m], Freedom(jitter=jitter), rows, range(1, 2), far=True)
+    off = sorted(((distance(m, x.parts[0]), x.row) for x in near), key=lambda x: x[0])
+    if len(off) < 2 or len(off[0][1].under) == 1:
         return None
     size = max(off[0][0], m.size_left)
     if not (size < SOLVED and size < 0.01 * off[1][0]):
         return None
-    cause = f"{capital(SCHEMES[off[0][1]].title)}, its equation solved to {size:.1e} of the state"
+    cause = f"{capital(off[0][1].title)}, its equation solved to {size:.1e} of the state"
     return Explanation(cause, "iterate further, or give the solver a smaller tolerance", local=True)
+
+
+def accumulates(record: Record, j: int) -> Explanation | None:
+    """A force to which that of every step is added: v'' - 2 v' + v is a multiple of the position."""
+    q, v = record.q[:, j].astype(float), record.v[:, j].astype(float)
+    twice = np.diff(v, 2)
+    room = 64 * ROUNDING * float(np.max(np.abs(v))) + 8 * float(np.max(record.dv[:, j]))
+    for x in (q[1:-1], q[2:]):
+        known = np.column_stack([x, np.ones(len(x))])
+        numbers = np.linalg.lstsq(known, twice, rcond=None)[0]
+        if np.max(np.abs(twice - known @ numbers)) <= room < abs(numbers[0]) * np.ptp(x) / 64:
+            cause = "The forces add up: that of each step is added to the sum of those before, never cleared"
+            return Explanation(cause, "set the forces to 0 before they are worked out", local=True)
+    return None
+
+
+def not_opposite(record: Record, each: list[int]) -> Explanation | None:
+    """Forces between two coordinates that are not equal and opposite, where one map of all is the motion."""
+    n, pace = len(each), record.interval
+    if n < 2 or record.mass is None or record.mixed or len(record.q) < 4 * n + 4:
+        return None
+    z = np.column_stack([record.q[:, each], record.v[:, each] * pace])
+    known = np.column_stack([z[:-1], np.ones(len(z) - 1)])
+    x, inverse = least_squares(known, z[1:])
+    left = float(np.max(np.abs(z[1:] - known @ x)))
+    if left > 1e-9 * float(np.max(np.abs(z))):
+        return None
+    force = (x[:n, n:].T * record.mass[each][:, None]).astype(float)
+    error = 1e-6 * float(np.max(np.abs(force))) + 8 * left * float(np.sqrt(np.max(np.abs(inverse))))
+    off = np.triu(np.abs(force - force.T))
+    a, b = np.unravel_index(int(np.argmax(off)), off.shape)
+    if off[a, b] <= error:
+        return None
+    how = "has the wrong sign" if abs(force[a, b] + force[b, a]) <= error else "is not equal to it"
+    cause = f"The forces between coordinates {each[a]} and {each[b]} are not opposite: the reaction {how}"
+    return Explanation(cause, "give the two particles forces that are equal and opposite", local=True)
+
+
+def other_times(record: Record, j: int, m: Map, stiffness: float | None) -> Explanation | None:
+    """Steps that are far from the interval, where they vary and no map is that of a scheme."""
+    if stiffness is None or record.mass is None or not stiffness > 0:
+        return None
+    pull = stiffness / float(record.mass[j]) * float(record.interval) ** 2
+    (_, drift), (kick, _) = m.unscaled
+    ways = (1 / drift if drift else -1.0, -pull / kick if kick else -1.0)
+    factor = float(np.sqrt(max(ways[0] * ways[1], 0)))
+    if min(ways) <= 0 or not 0.8 < ways[0] / ways[1] < 1.25 or 1 / FAR_TIMES < factor < FAR_TIMES:
+        return None
+    cause = f"times are {factor:.3g} times what was stepped: the steps taken are about "
+    cause += f"{abs(float(record.interval)) / factor:.3g}, and not all alike"
+    return Explanation(cause, "write the time of the solver with each state", local=True)

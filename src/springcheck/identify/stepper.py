@@ -11,6 +11,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.catalogue import FAULTS, of_scheme, title
+from springcheck.identify.elsewhere import ELSEWHERE
 from springcheck.identify.pair import Timeless, on_a_pair, returned
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
@@ -22,7 +23,6 @@ from springcheck.physics.exact import true_motion
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.schemes import SCHEMES
-from springcheck.schemes.elsewhere import ELSEWHERE
 
 Stepper: TypeAlias = Callable[..., Any]
 
@@ -316,6 +316,11 @@ def _short(step: Stepper) -> list[Explanation]:
     off = max(abs(drift - 1), abs(kick - 1))
     if off < most:
         return []
+    x, y = q / 1.3, p / (0.7 * m)
+    if max(abs(x - 1), abs(y - 1)) > most:
+        cause = f"A step of no length multiplies the position by {x:.4g} and the momentum by {y:.4g}"
+        remedy = "return what the last kick and drift have left: q and p as they are, p not with another sign"
+        return [Explanation(cause, remedy, off)]
     cause = (
         f"Over a short step the momentum changes by {kick:.5g} h F and the position by {drift:.5g} h p/m, "
         "where a scheme of any order has 1 and 1"

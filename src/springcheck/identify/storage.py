@@ -30,6 +30,9 @@ MOST_DIGITS = 16
 DIGITS_OF_SINGLE = 7
 """Significant decimal digits that a number of single precision has: more of them only rewrite it."""
 
+MOSTLY, MANY = 0.97, 50
+"""Share of numbers that have fixed decimals where a few have more, and fewest numbers that show it."""
+
 BY_CHANCE = 1e-6
 """Probability of a coincidence of numbers below which their format is certain."""
 
@@ -114,6 +117,10 @@ def storages(x: Floats) -> list[Storage]:
         # nine digits hold a number of single precision
         return [Storage(name="single")]
     found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
+    # a row of small numbers has more decimals than the others, as NumPy prints it
+    few = [d for d in range(decimals or 0) if np.mean([same(f"{y:.{d}f}", y) for y in listed]) >= MOSTLY]
+    if few and len(listed) >= MANY:
+        found.append(Storage(name=f"text, {few[0]} decimals", decimals=few[0]))
     if decimals is not None:
         found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
     # text that is finer than the numbers around it says nothing: every number has such a decimal form

@@ -254,7 +254,7 @@ class Curves:
             signs = np.sign(np.diff(bends))
         pieces: list[Any] = []
         for (r, parameter), bend, loss, rises in zip(each, bends, losses, signs, strict=True):
-            good = np.isfinite(bend) & np.isfinite(loss)
+            good = np.isfinite(bend) & np.isfinite(loss) & (np.abs(grid) <= table.rows[r].most)
             cut = np.flatnonzero((rises[1:] != rises[:-1]) | ~good[1:-1]) + 1
             for part in np.split(np.arange(len(grid)), cut):
                 # neighbouring pieces share the point between them
@@ -319,7 +319,7 @@ def _samples(row: Row, g: float) -> Any:
 
 def same(one: Row, other: Row) -> bool:
     """Whether two rows have one map."""
-    if bool(one.free) != bool(other.free):
+    if one.free != other.free:
         return False
-    g = 0.3 if one.damped and other.damped else 0.0
+    g = 0.3 if one.free else 0.0
     return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)

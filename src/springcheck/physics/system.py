@@ -60,12 +60,12 @@ class System(Generic[Fields]):
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the exact motion conserves the energy: without friction and drives."""
+        """Whether the exact solution conserves the energy: without friction and drives."""
         return not (self.is_damped or self.is_driven)
 
     @cached_property
     def clocked(self) -> Fields:
-        """The scene with a clock beside its particles (see `driven`), or itself if no force depends on
+        """The scene with a clock next to its particles (see `driven`), or itself if no force depends on
         time."""
         return with_clock(self.scene) if self.is_driven else self.scene
 
@@ -336,7 +336,7 @@ class System(Generic[Fields]):
         return type(self)(scene)
 
     def without(self, key: str) -> Self:
-        """The facts of the scene without its terms of one kind."""
+        """The system without the terms of one kind."""
         return self.beside(self.scene.derived(terms=tuple(term for term in self.terms if term.key != key)))
 
     @cached_property

@@ -2,7 +2,7 @@
 
 A term is a frozen dataclass of arrays, one entry a row, derived from `OnParticles` or `OnPairs`.  It states
 its law as four functions of the elongation u of its rows and of its parameters; all else (energy and force of
-a whole state, hardening, single precision, copies, parts of a scene) follows from them here.  A formula is
+a whole state, growth, single precision, copies, parts of a scene) follows from them here.  A formula is
 written once for every width of float, for one state and for a whole trajectory alike.
 """
 

@@ -243,7 +243,7 @@ SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}
 
 
 def _force_held(n: int) -> tuple[Stage, ...]:
-    """Kick and drift, n times a step, by the one force of its beginning."""
+    """Kick and drift, n times per step, by the one force of its beginning."""
     part = Fraction(1, n)
     again: tuple[Stage, ...] = (("held", part), ("drift", part))
     return (("kick", part), ("drift", part), *(again * (n - 1)))
@@ -280,7 +280,7 @@ _ATTACHED = (
 )  # fmt: skip
 
 ATTACHED: dict[str, Scheme] = {scheme.name: scheme for scheme in _ATTACHED}
-"""Schemes that follow from how a spring is attached to an engine, beside those that people choose: a force
+"""Schemes that follow from how a spring is attached to an engine, next to those that people choose: a force
 that is set once and held over substeps, friction that is taken implicitly where the force is not, or a spring
 that is solved for in every substep."""
 

@@ -23,7 +23,7 @@ Acting: TypeAlias = Literal["", "all", "potential", "slow", "fast"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
-    """The setting of a stage beside the state (..., n): masses and rates of friction (n,), the latter None
+    """The setting of a stage next to the state (..., n): masses and rates of friction (n,), the latter None
     where nothing is damped, and the force evaluated last (..., n)."""
 
     m: Reals

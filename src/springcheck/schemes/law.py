@@ -65,7 +65,7 @@ class Law:
     def rates(self, *, varied: bool = False) -> Any:
         """Friction as a step takes it: rates, or where they depend on the position a function of the end Q
         and the start q of an implicit stage, (..., n) each.  It gives the rates at Q, their derivatives times
-        Q - q, and what the changes of a motion lose beside the rates, all (..., n) [1/T], [1/T], [L/T]."""
+        Q - q, and what the changes of a motion lose next to the rates, all (..., n) [1/T], [1/T], [L/T]."""
         system = self.scene.system
         if not system.brakes_by_place:
             return self.rate

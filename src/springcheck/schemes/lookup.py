@@ -58,7 +58,7 @@ def scheme(name: str) -> Scheme:
 
 def meant(name: str, beside: Iterable[str] = ()) -> str:
     """ ", did you mean ...?" for an unknown name: the schemes that textbooks call so, else the nearest name
-    of a scheme or of those `beside`, else those whose titles have these words.  Of a solver that chooses its
+    of a scheme or of those `next to`, else those whose titles have these words.  Of a solver that chooses its
     steps ": it is ...", with what runs it."""
     found, bare = textbook(name), _bare(name)
     if bare in ADAPTIVE_SOLVERS:

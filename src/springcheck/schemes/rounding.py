@@ -86,7 +86,7 @@ def _tableau(
 ) -> tuple[Reals, Reals]:  # fmt: skip
     """The same for a Butcher tableau.
 
-    Beside the bounds it carries the states of the stages themselves, signs and all: the bound of a stiff
+    Next to the bounds it carries the states of the stages themselves, signs and all: the bound of a stiff
     force says nothing of the size of the state that the force leads to.
     """
     (q, p), size = (np.abs(x) for x in start), np.abs(h)

@@ -37,7 +37,7 @@ _DOUBLE = Arithmetic()
 class Run:
     """A trajectory without its numbers: the attributes of /parameters/<label>.
 
-    A text beside a type is the field of a `Trajectory` that the attribute stores.
+    A text next to a type is the field of a `Trajectory` that the attribute stores.
     """
 
     label: str

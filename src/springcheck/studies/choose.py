@@ -71,7 +71,7 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
         if out.method in patterns:
             raise MethodError(f"{out.method} cannot run scene {scene.name}: {out.reason}")
     if not chosen:
-        raise MethodError(f"no method can serve scene {scene.name}: {left[0].reason}")
+        raise MethodError(f"no method can serve scene {scene.name}; {left[0].method}: {left[0].reason}")
     rest = engines.match(("*",), bath=bath, every=True) if own else ()
     others = (x for x in rest if x not in matched and not engines.obstacle(scene, x))
     return chosen, left, tuple(map(str, others))

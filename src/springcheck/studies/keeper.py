@@ -17,6 +17,7 @@ from springcheck import engines, store
 from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
+from springcheck.physics import stored as reference
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.store import Draft, Solution, Table
@@ -165,7 +166,7 @@ def study(
     *options: str, scene: Scene | None = None, **how: Unpack[How],
 ) -> R:  # fmt: skip
     """Run the study `measure` of these methods and save it in a store (see `kept`); `options` is all that
-    determines its numbers besides the scene."""
+    determines its numbers apart from the scene."""
     more = options if scene is None else (scene.digest, *options)
     with kept(path, command(name, labels, *more), **how) as keeper:
         found = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)
@@ -209,9 +210,23 @@ def restored(name: str, path: Path, kinds: Mapping[str, type]) -> Studied:
     return found
 
 
+REFERENCE = "reference"
+"""Name of the table with the reference solution of a store's scene."""
+
+
+def reference_of(scene: Scene) -> list[store.Table]:
+    """The reference solution of a scene as a table, none where it was not integrated."""
+    digest, columns = reference.columns(scene)
+    about = "see springcheck.physics.exact.stored: Legendre series of the momenta, extended numbers as two"
+    attributes = {"digest": digest, "about": about}
+    return [store.Table(name=REFERENCE, columns=columns, attributes=attributes)] if columns else []
+
+
 def stored_scene(path: Path) -> Scene:
-    """The scene of a store, parsed from its saved text."""
+    """The scene of a store, parsed from its saved text; its reference is taken from there as well."""
     name = str(store.summary(path).root.get("scene_name", path.stem))
+    if known := store.tables_of(path).get(REFERENCE):
+        reference.take(str(known.attributes.get("digest")), known.columns)
     return scenefile.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
 
 

@@ -15,13 +15,13 @@ function compared(run) {
   const { share, frame, first } = departure(run, run.loop ? DATA.spring : DATA.linear, law);
   if (run.loop && !first) return ["equal"];
   if (run.loop) {
-    return ["wrong", `${label} differs first in frame ${first.i}, t = ${t[first.i]}: here q = ${first.q}, `
+    return ["wrong", `${label} differs first in frame ${first.i}, t = ${number(t[first.i], 6)}: here q = ${first.q}, `
       + `p = ${first.p}; in the file q = ${q[first.i]}, p = ${p[first.i]}`];
   }
   const told = run.failed ? ", as its verdicts say" : "", kind = told ? "told" : "wrong";
   const much = share < 1e3 ? `${number(share, 2)} times` : "more than a thousand times";
   return share <= 1 ? ["near"] : [kind, `${label} is not ${run.title}: in frame ${frame}, `
-    + `t = ${t[frame]}, its difference is ${much} what rounding allows${told}`];
+    + `t = ${number(t[frame], 6)}, its difference is ${much} what rounding allows${told}`];
 }
 
 function selfCheck() {
@@ -36,8 +36,8 @@ function selfCheck() {
   }
   const { equal, near, wrong } = said;
   const put = (words, labels) => labels.length && lines.push(`${words}: ${labels.join(", ")}`);
-  put(`q and p the same doubles (${[...frames].join(", ")} frames)`, equal);
-  put("the scheme's motion to rounding, or the exact one to tolerance", near);
+  put(`q and p equal bit for bit (${[...frames].join(", ")} frames)`, equal);
+  put("the scheme's solution to rounding, or the exact solution to tolerance", near);
   put("not computed again here", said.not);
   const [result, look, head] = wrong.length ? ["differs", "bad", "Your browser and this file differ:"]
     : !equal.length && !near.length ? ["none", "", "None of these methods is computed again here."]

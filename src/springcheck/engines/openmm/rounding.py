@@ -26,7 +26,7 @@ _PRECISIONS = {
         ("single", 2.0**-24, 2.0**-24), ("mixed", 2.0**-48, 2.0**-24), ("double", 2.0**-53, 2.0**-53),
     )
 }  # fmt: skip
-"""Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
+"""Bond parameters are stored in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 

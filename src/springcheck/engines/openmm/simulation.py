@@ -37,9 +37,10 @@ from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.engines.openmm.rounding import CUSTOM, arithmetic, sizes
 from springcheck.engines.openmm.thermostats import thermostat
+from springcheck.engines.solvers import timed
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import Drive, timed
+from springcheck.physics.driven import Drive
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Distances, Morse, RadialSpring, WallSpring
 
@@ -58,7 +59,7 @@ SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-s
 
 
 FAST_STEPS = {"mts": 8}
-"""Evaluations of the fast springs in a step, beside one of the others, by method."""
+"""Evaluations of the fast springs in a step, next to one of the others, by method."""
 
 CUSTOM_STAGES = {
     "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),
@@ -134,7 +135,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
 
 
 def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
-    """A term as its energy in a coordinate x, y or z of a particle, or in the length r of a bond."""
+    """The energy of a term as an expression in x, y or z of a particle, or in the length r of a bond."""
     energy, names = CUSTOM_TERMS[term.key]
     if term.bodies == 2 and scene.places is not None:
         raise MethodError(

@@ -1,4 +1,4 @@
-"""The kernels compiled by numba, cached beside them, and loaded only as they were written.
+"""The kernels compiled by numba, cached next to them, and loaded only as they were written.
 
 numba loads cached code without a check: a file cut short or zeroed ends in an exception of any kind, or kills
 the process.  So a digest of every file is stored beside them, and what does not match is removed and compiled

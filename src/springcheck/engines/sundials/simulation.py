@@ -26,9 +26,9 @@ from sksundae.ida import IDA
 
 from springcheck.engines import quiet, solvers
 from springcheck.engines.contract import Label, Method, Simulation, Stopped
+from springcheck.engines.solvers import timed
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Reals
-from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
@@ -76,7 +76,7 @@ LARGE = 32
 
 MOST_ALIKE = 1e3
 """Ratio of stiffnesses up to which they may be summed in one matrix: three digits are lost then.  A soft
-spring beside a stiff one would lose more, and is evaluated spring by spring."""
+spring next to a stiff one would lose more, and is evaluated spring by spring."""
 
 
 def _suits_matrix(scene: Scene) -> bool:

@@ -153,7 +153,7 @@ def _explain(message: str, data: Any) -> str:
         return f"{field or 'the scene'}: it {said}" + f"; its fields are {', '.join(known)}" * bool(known)
     wanted = re.sub(r", got .*|^Expected ", "", what).replace(" | null", "")
     if wanted.startswith("`array`") and ((table and "[" not in field) or isinstance(found, dict)):
-        return f"{field}: there may be several of it: write [[{field}]], in double brackets, for each"
+        return f"{field}: write [[{field}]], in double brackets, for each one"
     if isinstance(found, list) and wanted == "`object`" and "[" not in field:
         return f"{field}: there is one of it: write [{field}], in single brackets, once"
     shown = str(found).lower() if isinstance(found, bool) else repr(found)

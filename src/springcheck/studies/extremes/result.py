@@ -62,7 +62,7 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
 
 
 def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:
-    """Outcomes, numbered, over decades of force and of h w, where cells have both."""
+    """Outcomes as numbers over decades of force and of h w, for viewers."""
     found = {"outcome_number": np.array([OUTCOMES.index(cell.outcome) for cell in cells], np.int8)}
     for name in ("force", "h_w"):
         values = np.array([cell.parameters.get(name, np.nan) for cell in cells], np.float64)
@@ -226,8 +226,8 @@ def _chart(cells: Sequence[Cell]) -> Chart:
 
 
 def _filled(row: list[int]) -> list[int]:
-    """A row of outcomes, each cell extended half-way to the next one tried: a coarse grid has other forces in
-    every row."""
+    """A row of outcomes; each cell extends half-way to its neighbours, since rows of coarse grids differ in
+    their forces."""
     tried = np.flatnonzero(np.asarray(row) >= 0)
     if len(tried) < 2:
         return row

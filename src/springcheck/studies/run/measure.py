@@ -70,7 +70,7 @@ def _holds_runs(path: Path) -> bool:
 
 
 def stored(path: Path) -> Stored:
-    """Data of a run that are stored beside its trajectories."""
+    """Data of a run that are stored next to its trajectories."""
     # an unfinished run has trajectories in its journal, and no file yet
     if not path.is_file():
         return Stored(path=path, verdicts=(), comparison=None)
@@ -174,6 +174,8 @@ def run(
                 report = replace(report, verdicts=(*report.verdicts, *more))
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
         report = replace(report, broke=broke)
+        for table in keeper.reference_of(scene):
+            journal.add(table)
         journal.commit(
             scene, comparison=report.comparison, verdicts=report.verdicts, solution=gathered.solution(),
             documents={"run": json.dumps(report.kept_document(), allow_nan=False)},

@@ -46,7 +46,7 @@ class Report(StudyResult):
     judged_frames: int
     """Frames of each run that were judged: all of them, unless the run is very long."""
     temperatures: tuple[Heated, ...] = ()
-    """Measured temperatures of every run in a bath, beside those of its scheme."""
+    """Measured temperatures of every run in a bath, next to those of its scheme."""
     resumed: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
     """Methods that can serve the scene and do not run by default."""
@@ -193,7 +193,7 @@ def restored(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repeat:
-    """A stored trajectory beside its repetition."""
+    """A stored trajectory next to its repetition."""
 
     method: str
     equal: bool

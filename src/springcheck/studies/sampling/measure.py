@@ -1,4 +1,4 @@
-"""Thermostats on a thousand equal springs: temperatures and stability limits, each beside its law."""
+"""Thermostats on a thousand equal springs: temperatures and stability limits, each next to its law."""
 
 from __future__ import annotations
 
