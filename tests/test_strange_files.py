@@ -181,6 +181,12 @@ XYZ = "".join(
 )
 
 
+def test_positions_alone_of_atoms_are_positions_alone() -> None:
+    Path("x.xyz").write_text("".join(f"1\nt = {t}\nAr {q} 0 0\n" for t, q in zip(T, Q, strict=True)))
+    found = read("x.xyz")
+    assert (found.q[:, 0].tolist(), found.v) == (Q.tolist(), None)
+
+
 def test_other_atoms_are_not_taken_for_the_same() -> None:
     Path("x.dump").write_text(dump(lambda i: 1 if i < 7 else 2))
     with pytest.raises(StoreError, match="frame 7 has other atoms than the first"):

@@ -205,10 +205,12 @@ def _by_place(parts: Sequence[Floats], places: Sequence[tuple[str, float]]) -> F
     return np.asarray(np.hstack(parts)[:, np.lexsort((axis, particle, number))])
 
 
-def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float | None = None) -> States:
+def split(
+    path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float | None = None, finite: bool = True
+) -> States:
     """Named columns as states; without times, frames are a `step` apart, where it is stated.
 
-    StoreError names those that are missing or do not fit together.
+    StoreError names those that are missing, do not fit together or, where they must be, are not `finite`.
     """
     parts: dict[Kind, list[Floats]] = {}
     places: dict[Kind, list[tuple[str, float]]] = {}
@@ -249,7 +251,7 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float 
         if what != "t" and values.shape != (len(t), n):
             raise StoreError(f"{path}: columns of {what}: {values.shape[1]}, of q: {n}")
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(bad):
+        if len(bad) and finite:
             raise StoreError(f"{path}: row {bad[0] + 1} of {what} is not finite")
     if roundoff == 2.0**-53 and all(is_single(x) for what, x in states.items() if what != "t"):
         roundoff = 2.0**-24
