@@ -114,11 +114,9 @@ def explained(
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
     if first is None:
         return list(verdicts)
-    # imported here: only failures are explained
-    from springcheck.checks import causes
-
-    case = Case(trajectory=run, scene=scene)
-    said = causes.found(case, lambda first, few: shown(scene, run, first, few))
+    frame, few = seldom_off(Case(trajectory=run, scene=scene))
+    with np.errstate(all="ignore"):
+        said = shown(scene, run, frame, bool(few)) or few
     why = f"{first.why}{DIAGNOSIS}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 

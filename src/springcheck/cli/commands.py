@@ -220,7 +220,7 @@ def _look_on(
     """As `_look`, of a file of a scene, whose force is known."""
     from springcheck import schemes
     from springcheck.cli import taken
-    from springcheck.identify.steps import on_scene
+    from springcheck.identify.scenes import of_scene
     from springcheck.physics.scenefile import load_scene
 
     schemes.bring(schemes.UNKNOWN)
@@ -229,7 +229,7 @@ def _look_on(
             path, found = Path(file), load_scene(scene)
             states = taken.states_in(path, columns, stated["step"], trajectory)
             judged, run, notes, _ = taken.as_trajectory(path, states, found, schemes.UNKNOWN.name)
-            return {path.name: on_scene(judged, run, notes)}, []
+            return {path.name: of_scene(judged, run, notes)}, []
     except (SpringcheckError, OSError) as error:
         return error
 
@@ -361,7 +361,7 @@ COMMANDS = (
     Command("judge", "judge a trajectory of any program by its scheme", _judge, (
         argument("file", metavar="FILE", help=f"a store, or a file of any program: {FORMATS}"),
         argument("--scene", required=True, metavar="SCENE", help="the scene of the trajectory"),
-        argument("--scheme", required=True, metavar="NAME", help="the scheme to judge it by"),
+        argument("--scheme", metavar="NAME", help="the scheme to judge it by (default: the one it shows)"),
         _NAMES,
         _GROUP,
         _STEPS,

@@ -312,7 +312,7 @@ MOST_STORED = 32
 _STORED: dict[str, ReferenceMotion | str] = {}
 """The latest references, or why there is none, by the digests of their scenes."""
 FILLED: dict[str, Callable[[ReferenceMotion], None]] = {}
-"""What reads a reference from a file, by the digest of its scene (see `stored`)."""
+"""What reads a reference from a file, by the digest of its scene (see `springcheck.studies.references`)."""
 
 
 def reference(system: System[Any]) -> ReferenceMotion:
