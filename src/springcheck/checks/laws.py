@@ -177,7 +177,7 @@ def rounding_bias(bench: Bench) -> Finding | str:
     # the first that is no number, or else the worse
     worst = int(np.argmax(off / limit))
     if np.all(off <= limit) and np.max(limit) >= (most := schemes.roundings(bench.scheme) * 2.0**-52):
-        return f"its random walk hides even {most:.1e} per step, the bias of every rounding together"
+        return f"rounding noise would hide even the largest bias, {most:.1e} per step"
     seen = "; ".join(
         f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} per step, implied is {implied:.1e}"
         for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)

@@ -80,7 +80,7 @@ def _no_answer(case: Any) -> str | None:
     if alone is case:
         return None
     if case.scheme.has("flow") or case.steps[0] != 0:
-        return "the response to a drive is known for schemes that evaluate forces, from step 0"
+        return "the response to a drive is known only for schemes that evaluate forces, and from step 0 on"
     found = schemes.rotation(alone.law.propagator)
     if case.sums_steps:
         return "the discrete response to a drive is known for times n h, and these times are running sums"
