@@ -37,7 +37,7 @@ class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
     They hold numbers, booleans or text; `units` has the unit of a column.  A viewer draws the column
-    `signal` over `axes` ("." for an index), with the columns `auxiliary`; those in `log` on a logarithmic scale.
+    `signal` over `axes` ("." for an index), with the columns `auxiliary`; those in `log` logarithmically.
     """
 
     name: str
