@@ -199,14 +199,12 @@ TEXT = """# A census of teaching code
 that name a scheme {right} are that scheme to rounding and {wrong} are not; {none} name none.
 
 A step stands for the idea and not for its author. A question on a forum is there because somebody asked for
-help; answers are in the table too. Hamiltonian Monte Carlo reverses the momentum on purpose. Sources with a
-slash are GitHub repositories, and may have changed since. "Read" says how: the whole step in a stored excerpt
+help; answers are in the table too. Hamiltonian Monte Carlo reverses the momentum on purpose. Sources such
+as NAME/REPOSITORY are on GitHub, and may have changed since. "Read" says how: the whole step in a stored excerpt
 of the page, or from memory, as it is widely known. [census.py](census.py) has the transcriptions.
 
 ## Not the scheme that the text names, or none named
 
-| step | source | named | identified |
-|---|---|---|---|
 {others}
 
 ## All steps
@@ -238,7 +236,7 @@ def main(*arguments: str) -> int:
     others = [row for row in rows if row["as_named"] != "yes"]
     text = TEXT.format(
         n=len(rows), named=count["yes"] + count["no"], right=count["yes"], wrong=count["no"], none=count["-"],
-        others="\n".join("| {step} | {source} | {named} | {identified} |".format(**row) for row in others),
+        others="\n".join("* **{step}** ({source}), named {named}: {identified}.".format(**row) for row in others),
         all="\n".join("| {step} | {source} | {named} | {as_named} | {read} |".format(**row) for row in rows),
     )  # fmt: skip
     (HERE / "README.md").write_text(text, encoding="utf-8")
