@@ -175,7 +175,7 @@ def judge(
     case = Case(trajectory=trajectory, scene=scene, piece=piece)
     if (random := case.law.has("random")) and scene.bath is None:
         raise MethodError(
-            f"{trajectory.scheme} needs a bath, which [bath] gives: scene {scene.name} has none"
+            f"{trajectory.scheme} needs a heat bath, and scene {scene.name} has none: add [bath] to it"
         )
     return shared([one(case) for one in ((RANDOM if random else CHECKS) if checks is None else checks)])
 

@@ -57,7 +57,7 @@ def _plot(options: Namespace) -> int:
         raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
     ours = not options.columns and (not path.is_file() or formats.is_store(path))
     if ours and options.step is not None:
-        raise SpringcheckError(f"{path}: --step goes with the file of another program")
+        raise SpringcheckError(f"{path}: --step is for files of other programs; a store has its step")
     doubts = output.doubts(options.file) if ours else []
     with output.warned(options.file, doubts):
         if ours and options.trajectory is None:

@@ -219,8 +219,8 @@ MOST_NEWTON_STEPS = 50
 def _braked(
     at: Reals, q: Reals, p: Reals, x: Any, m: Reals, force: Force, rate: Callable[..., Any]
 ) -> tuple[Reals, Reals, Reals]:
-    """Residual of a stage's end `at`, times 1 + x rate, its derivative but for the stiffness, and the size of
-    what cancels in it, (..., n)."""
+    """Residual of an implicit stage that ends in `at`, its derivative without the stiffness, and the size of
+    the terms that cancel in it, (..., n)."""
     braked, bent, lost = rate(at, q)
     slowed, moved, kick = 1 + x * braked, at - q, x * force(at, np.zeros_like(p))
     lacks = moved * slowed + x * (lost - (p + kick) / m)
