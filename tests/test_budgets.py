@@ -34,7 +34,6 @@ BUDGETS = {
 
 TO_COME = {
     ("physics",): 3800,
-    ("physics/exact",): 1490,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4900,
     ("identify",): 6080,

@@ -205,7 +205,7 @@ def trr(atoms: Callable[[int], int]) -> bytes:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("x.trr", trr(lambda i: 1 + (i > 5)), "not of as many particles each"),
+        ("x.trr", trr(lambda i: 1 + (i > 5)), "the number of particles changes from frame to frame"),
         ("x.csv.gz", gzip.compress(table(T, Q, V).encode())[:-9], "packed is damaged or cut off"),
         ("x.csv.gz", gzip.compress(bytes(9999))[:10] + b"\xff" * 99, "packed is damaged or cut off"),
         ("x.dump", dump(lambda i: 1)[:-9].encode(), "fewer words than it should have"),

@@ -268,7 +268,7 @@ def split(
 
 
 def _energies_alone(path: Path, columns: Columns) -> None:
-    """StoreError where columns are energies: what they show, and what they do not."""
+    """Raise StoreError if the columns are energies, which identify no scheme."""
     found = {name: x for name, x in columns.items() if re.fullmatch(ENERGY, _parted(name)[0])}
     if not found:
         return

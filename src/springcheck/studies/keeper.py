@@ -17,10 +17,10 @@ from springcheck import engines, store
 from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
-from springcheck.physics import stored as reference
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.store import Draft, Solution, Table
+from springcheck.studies import references
 from springcheck.studies import team as teams
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut
@@ -216,8 +216,8 @@ REFERENCE = "reference"
 
 def reference_of(scene: Scene) -> list[store.Table]:
     """The reference solution of a scene as a table, none where it was not integrated."""
-    digest, columns = reference.columns(scene)
-    about = "see springcheck.physics.exact.stored: Legendre series of the momenta, extended numbers as two"
+    digest, columns = references.columns(scene)
+    about = "see springcheck.studies.references: Legendre series of the momenta, extended numbers as two"
     attributes = {"digest": digest, "about": about}
     return [store.Table(name=REFERENCE, columns=columns, attributes=attributes)] if columns else []
 
@@ -226,7 +226,7 @@ def stored_scene(path: Path) -> Scene:
     """The scene of a store, parsed from its saved text; its reference is taken from there as well."""
     name = str(store.summary(path).root.get("scene_name", path.stem))
     if known := store.tables_of(path).get(REFERENCE):
-        reference.take(str(known.attributes.get("digest")), known.columns)
+        references.take(str(known.attributes.get("digest")), known.columns)
     return scenefile.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
 
 

@@ -228,4 +228,4 @@ class Solver:
             rows = np.array(states)
             q[: len(rows)], p[: len(rows)] = rows[:, :n], rows[:, n : 2 * n]
         if failure:
-            raise Stopped(len(states), " ".join([failure, *said]).strip())
+            raise Stopped(len(states), " ".join(" ".join([failure, *said]).split()))

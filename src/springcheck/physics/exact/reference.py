@@ -170,7 +170,7 @@ class Path:
             expected = self.calls * float(end) / done
             if self.calls > (TRIAL_CALLS if expected > UNEVEN * limit else limit):
                 raise NoReferenceError(
-                    f"it needs about {expected:.1g} calls of the force, and at most {limit} are made"
+                    f"it needs about {expected:.1g} force evaluations; the limit is {limit}"
                 )
             self._step()
 
@@ -312,7 +312,7 @@ MOST_STORED = 32
 _STORED: dict[str, ReferenceMotion | str] = {}
 """The latest references, or why there is none, by the digests of their scenes."""
 FILLED: dict[str, Callable[[ReferenceMotion], None]] = {}
-"""What reads a reference from a file, by the digest of its scene (see `stored`)."""
+"""What reads a reference from a file, by the digest of its scene (see `springcheck.studies.references`)."""
 
 
 def reference(system: System[Any]) -> ReferenceMotion:

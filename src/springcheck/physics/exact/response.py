@@ -23,7 +23,6 @@ _Complex = NDArray[np.complexfloating[Any, Any]]
 SERIES_TERMS = 26
 """Terms of a series within |x t| < 1: the next one is below a rounding of 113 bits."""
 
-
 _Drive: TypeAlias = tuple[np.longdouble, np.longdouble, Extended]
 
 
