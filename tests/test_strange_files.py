@@ -418,6 +418,9 @@ def test_energies_alone_are_said_to_be_that(head: str) -> None:
     Path("x.csv").write_text(table(*many, head=head))
     with pytest.raises(StoreError, match=r"energies alone.*changes by .* of its size.*record positions"):
         read("x.csv")
+    np.savez("x.npz", t=T, E_tot=np.stack([Q, V], axis=1))
+    with pytest.raises(StoreError, match=r"energies alone.*E_tot changes by"):
+        read("x.npz")
 
 
 def test_coordinates_as_gromacs_writes_them_are_those_of_its_atoms() -> None:
