@@ -194,7 +194,7 @@ HELD = Row(
 PARAMETERS = (
     Row(scheme="theta", title="the theta method", formula=_theta, free="theta", start=(0.6, 0.8, 0.4)),
     Row(scheme="stages", title="RK4 whose stages take other steps", formula=_stages, free="stages",
-        start=(0.02, 0.1, 0.4, 1.5, 2.5)),
+        start=(0.02, 0.1, 0.4, 1.5, 2.5, 10.0)),
     Row(scheme="newmark", title="Newmark's method, gamma 1/2", formula=_newmark, free="beta",
         start=(0.1, 0.2, 0.3)),
 )  # fmt: skip
@@ -255,6 +255,10 @@ STEPS: tuple[tuple[str, str, str, Any], ...] = (
     ("no-first-kick",
      "Velocity Verlet without its first half kick", "add the half kick before the drift",
      (DRIFT, HALF_KICK)),
+    ("no-square",
+     "Velocity Verlet without h**2/2 a in the position, which moves by h v alone",
+     "move the position by h v + h**2/2 a",
+     lambda a, g: (1 + 0 * a, 1 + 0 * a, -a, 1 - a / 2)),
     ("implicit-velocity",
      "An implicit velocity, but the position is moved by the old velocity",
      "move the position by the new velocity: q + h v'",

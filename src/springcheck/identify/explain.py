@@ -8,7 +8,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.catalogue import titles
-from springcheck.identify.frames import bad_frames, whose
+from springcheck.identify.frames import bad_frames, changed, whose
 from springcheck.identify.laws import law, of_a_solver
 from springcheck.identify.measure import Map, measure
 from springcheck.identify.repairs import EXCHANGED, FALLS, REPAIRS, turned
@@ -99,7 +99,7 @@ def explain(seen: Seen, again: Callable[[Record, Seen], Identification] | None) 
     found = not_opposite(record, seen.moving) or other_times(record, j, m, stiff) or accumulates(record, j)
     if found:
         return [found]
-    found = bad_frames(record, m, j) or law(seen.maps, m, record.jitter)
+    found = changed(record, m, j) or bad_frames(record, m, j) or law(seen.maps, m, record.jitter)
     vague = not found.shown or found.cause.startswith("Noise")
     return [(_solved(record, m) if vague else None) or found]
 

@@ -36,7 +36,7 @@ def of_stiffness(seen: Seen, x: Joint) -> str:
     m, k = float(seen.record.mass[j]), float(seen.stiffness[j])
     if ratio < 0:
         return "the force has the wrong sign"
-    part = x.parts[0]
+    part, h = x.parts[0], abs(float(seen.record.interval)) / x.stride
     room = 1e-6 + 6 * part.a_error / abs(part.a) + 2 * seen.record.jitter
     if abs(ratio - 1) <= 10 * room:
         return ""
@@ -45,6 +45,7 @@ def of_stiffness(seen: Seen, x: Joint) -> str:
         (2.0, "k q**2 taken for k/2 q**2"), (0.5, "k/2 q**2 taken for k q**2"),
         *((10.0**n, "another unit of length or energy") for n in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)),
         (1 / m, "the force is divided by the mass although p is a momentum"), (m, "the mass is left out"),
+        (1 / h, "the velocity changes by F/m, not by h F/m: the step is left out"),
         (1 / k, "the stiffness is left out"), (k, "the stiffness is squared"),
         ((m / k) ** 2, "mass and stiffness are exchanged"),
         (math.radians(1), "the force takes positions for degrees"),
@@ -82,7 +83,7 @@ def of_velocities(seen: Seen, x: Joint) -> str:
         (near(1 / h, h, stated=True), "the position moves by h**2 v: the step enters twice", False),
         (near(h, 1), "velocities are multiplied by the step: they are displacements", True),
         (near(1 / h, 1), "velocities are divided by the step", True),
-        (near(scale, scale**-2, stated=True) and abs(scale - 1) > 1e-2,
+        (near(scale, scale**-2, stated=True) and abs(scale - 1) > 1e-3,
          steps + (f" ({of_time})" if of_time else ""), False),
         (bool(of_time), f"velocities are {scale:.6g} times what they should be: {of_time}", True),
     )  # fmt: skip

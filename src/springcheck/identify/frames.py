@@ -22,6 +22,9 @@ FOLLOWING: tuple[tuple[int, int, str], ...] = (
 )  # fmt: skip
 """Bad pairs in a row, the power of the map over them, what has happened."""
 
+OF_A_MAP, FEWEST_OF_A_MAP = 64.0, 8
+"""Largest residual of a map's pairs, in roundings, and fewest pairs that show one."""
+
 MOST_SHARE = 0.06
 """Largest share of pairs that may be bad."""
 
@@ -52,6 +55,28 @@ def bad_frames(record: Record, m: Map, j: int) -> Explanation | None:
         return None
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     return _said(record, found, m.base, runs, rest)
+
+
+def changed(record: Record, m: Map, j: int) -> Explanation | None:
+    """One map up to a frame, and another from there on."""
+    n = len(m.unit)
+    pairs, part = np.arange(n), n // 3
+    if not record.fine or part < FEWEST_OF_A_MAP:
+        return None
+    for kept, way in ((pairs < part, 0), (pairs >= n - part, -1)):
+        found = measure(record, j, kept)
+        bad = np.flatnonzero(np.max(np.abs(found.left), 1) / m.base > OF_A_MAP)
+        rest = pairs >= bad[0] if len(bad) and not way else pairs <= bad[-1] if len(bad) else kept
+        if np.any(kept & rest) or np.count_nonzero(rest) < FEWEST_OF_A_MAP or len(bad) < len(pairs[rest]) / 2:
+            continue
+        other = measure(record, j, rest)
+        if np.max((np.max(np.abs(other.left), 1) / m.base)[rest]) <= OF_A_MAP:
+            first, then = (found, other) if not way else (other, found)
+            at = int(bad[0]) if not way else int(bad[-1]) + 1
+            cause = f"The motion is one{whose(record, first)} up to frame {at}, and another"
+            cause += f"{whose(record, then)} from there on"
+            return Explanation(cause, "look at what changes there: scheme, step or force", local=True)
+    return None
 
 
 def _good_pairs(record: Record, m: Map, j: int) -> tuple[Any, Map]:

@@ -19,6 +19,7 @@ from springcheck.identify.result import Identification, nothing
 from springcheck.identify.say import either_way, said, unnamed
 from springcheck.identify.search import Seen, search
 from springcheck.identify.seeing import see
+from springcheck.identify.shapes import not_opposite
 from springcheck.identify.uneven import of_uneven
 
 CLEAN, FEWEST_LATE, HALF_A_STEP_AGO = 64.0, 12, "half a step ago"
@@ -89,6 +90,9 @@ def of_record(
         return said(again, found, one) if found and one else unnamed(seen, drift(seen))
     found, one = search(seen)
     if found and one:
+        coupled = seen.record is not record and not any(x.row.damped for x, _ in found)
+        if coupled and (unlike := not_opposite(record, record.moving, surely=True)):
+            return unnamed(seen, unlike)
         return said(seen, found, one)
 
     if repairing and (late := _started_late(seen, record, stiffness, friction, step)):

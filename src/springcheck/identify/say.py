@@ -217,9 +217,11 @@ def _of_other_steps(seen: Seen, joints: list[Joint]) -> Explanation:
 def _of_a_parameter(seen: Seen, x: Joint) -> Identification:
     part, h = x.parts[0], abs(float(seen.record.interval)) / x.stride
     if x.row.free == "stages":
-        twice = abs(part.g / h - 1) < 1e-6
-        how = "h twice in its stages: they take h**2 k, not h k" if twice else (
-            f"stages of {part.g:.6g} times their steps")  # fmt: skip
+        how = f"stages of {part.g:.6g} times their steps"
+        if abs(part.g / h - 1) < 1e-6:
+            how = "h twice in its stages: they take h**2 k, not h k"
+        if abs(part.g * h - 1) < 1e-6:
+            how = "no h in its stages: they take k, not h k"
         return _refuted(seen, Explanation(f"RK4 with {how}", COMPARE, local=True))
     method = f"{x.row.title} with {x.row.free} = {part.g:.6g}"
     cause = f"{ONE_MAP}: if every step was recorded, {MAP_OF}{method}"

@@ -11,6 +11,7 @@ import numpy as np
 from springcheck.identify.arithmetic import arithmetic
 from springcheck.identify.catalogue import distinct
 from springcheck.identify.compare import SINGLE, Freedom, Joint, compare, likely
+from springcheck.identify.factors import of_velocities
 from springcheck.identify.measure import Map
 from springcheck.identify.record import Record
 from springcheck.identify.repairs import turned
@@ -266,6 +267,9 @@ def search(seen: Seen) -> tuple[Found, Round | None]:
                 continue
             good = kept
         agreeing = [(x, a) for x, a in good if seen.agrees(x)]
+        if one.scale and first[0] and first[0][0][0].row.fault:
+            # times of another unit are simpler than a mistake on another spring
+            agreeing = [(x, a) for x, a in good if of_velocities(seen, x).startswith("times")]
         if agreeing or not seen.told:
             return _best(agreeing or good, fine), one
         if one.group == WEAK:

@@ -40,7 +40,9 @@ def limited(record: Record, j: int) -> Explanation | None:
         # the top of a smooth motion is one frame, or two
         turns = np.count_nonzero(np.diff(at.astype(int)) == 1) + 1
         n = np.count_nonzero(at)
-        if most and FEWEST_AT_LIMIT <= n < len(x) / 2 and n >= 2 * turns:
+        # unless it is a number of few digits in states of many
+        chosen = float(f"{most:.3g}") == most and float(np.max(quantum[:, j])) < 1e-12 * most
+        if most and FEWEST_AT_LIMIT <= n < len(x) / 2 and (n >= 2 * turns or chosen):
             limit = float(f"{most:.12g}")
             return Explanation(
                 f"The {what} is clipped at {limit:.9g}: it is never above that, and stays there in "
@@ -163,8 +165,9 @@ def accumulates(record: Record, j: int) -> Explanation | None:
     return None
 
 
-def not_opposite(record: Record, each: list[int]) -> Explanation | None:
-    """Forces between two coordinates that are not equal and opposite, where one map of all is the motion."""
+def not_opposite(record: Record, each: list[int], *, surely: bool = False) -> Explanation | None:
+    """Forces between two coordinates that are not equal and opposite, where one map of all is the motion;
+    `surely` not, of whatever masses: the reaction is missing, or has the wrong sign."""
     n, pace = len(each), record.interval
     if n < 2 or record.mass is None or record.mixed or len(record.q) < 4 * n + 4:
         return None
@@ -180,7 +183,11 @@ def not_opposite(record: Record, each: list[int]) -> Explanation | None:
     a, b = np.unravel_index(int(np.argmax(off)), off.shape)
     if off[a, b] <= error:
         return None
+    missing = min(abs(force[a, b]), abs(force[b, a])) <= error
+    if surely and not missing and force[a, b] * force[b, a] > 0:
+        return None
     how = "has the wrong sign" if abs(force[a, b] + force[b, a]) <= error else "is not equal to it"
+    how = "is missing" if missing else how
     cause = f"The forces between coordinates {each[a]} and {each[b]} are not opposite: the reaction {how}"
     return Explanation(cause, "give the two particles forces that are equal and opposite", local=True)
 
