@@ -348,6 +348,9 @@ def test_a_slope_is_compiled_where_a_run_is_long_or_its_note_says_why_not(
     assert not own.compiled
     assert "opaque is not compiled (numba" in own.note
     assert "\n" not in own.note
+    monkeypatch.setattr(Opaque, "slope", "no function")
+    assert laws.why_not(type("Other", (Opaque,), {})).startswith("numba: ")
+    monkeypatch.undo()
     run = driver.run(replace(what, steps=10**5, every=10**4), "own:rk4")
     assert run.outcome.message == own.note
 

@@ -29,16 +29,17 @@ def _slope(kind: Any) -> tuple[Any, str]:
     import numba
 
     parameters = [c.field for c in kind.columns if c.field not in (kind.origin, "number")]
-    known = {"law": numba.njit(**HELP)(kind.slope)}
     # numba knows no calls with a varying number of arguments
     arguments = ", ".join(f"x[{i}, s]" for i in range(len(parameters)))
     source = f"lambda u, x, s: law(u, {arguments})"
     signature = numba.float64(numba.float64, numba.float64[:, ::1], numba.int64)
     try:
-        return numba.njit(signature, **HELP)(eval(source, known)), ""
+        law = numba.njit(**HELP)(kind.slope)
+        return numba.njit(signature, **HELP)(eval(source, {"law": law})), ""
     except Exception as error:
         said = [line.strip() for line in str(error).splitlines() if line.strip()]
-        why = next((line for line in said if not line.startswith(("Failed in", "\x1b"))), "") or said[:1]
+        told = (line for line in said if not line.startswith(("Failed in", "\x1b")))
+        why = next(told, type(error).__name__)
         return None, f"numba: {why:.120}"
 
 
