@@ -40,8 +40,8 @@ TO_COME = {
     ("identify",): 6080,
     ("store",): 2670,
     ("formats",): 1591,
-    ("studies",): 6450,
-    ("figures",): 2600,
+    ("studies",): 6350,
+    ("figures",): 2270,
     ("cli",): 3230,
     ("api", "text", "errors", "interrupts", "plot", "__init__", "__main__"): 1390,
 }
