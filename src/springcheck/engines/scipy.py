@@ -24,8 +24,8 @@ from springcheck.engines.contract import (
     named,
     version_of,
 )
+from springcheck.engines.solvers import timed
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.schemes import solver
 

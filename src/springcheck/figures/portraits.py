@@ -181,8 +181,9 @@ def _steep(motion: State) -> tuple[Frame, Frame] | None:
 
 
 def _sparse(truth: Motion | None, view: View, *frames: Frame) -> bool:
-    """Whether lines between points of the exact solution visibly miss it, in a tenth of the points: by a
-    quarter of a point's distance from the line between its neighbours."""
+    """Whether straight lines between points of the exact solution visibly miss it at a tenth of the points.
+
+    The miss is estimated as a quarter of a point's distance from the line between its neighbours."""
     if truth is None or len(truth[0]) < 3:
         return False
     t, *motion = truth[0], *view.pick(truth[1], truth[2])
