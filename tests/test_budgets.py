@@ -39,7 +39,7 @@ TO_COME = {
     ("identify",): 6080,
     ("store",): 2655,
     ("formats",): 1531,
-    ("studies",): 6350,
+    ("studies",): 6420,
     ("figures",): 2270,
     ("cli",): 3230,
     ("api", "text", "errors", "interrupts", "plot", "__init__", "__main__"): 1410,

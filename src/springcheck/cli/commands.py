@@ -317,13 +317,9 @@ COMMANDS = (
         _FILE,
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         argument("--particle", type=int, metavar="I",
-<<<<<<< HEAD
-                 help="the motion of this particle alone, from 0 on (default: of all)"),
+                 help="draw this particle only, 0 or more (default: all)"),
         argument("--x", metavar="NAME", help="of a study of precision: time, calls, or an error"),
         argument("--y", metavar="NAME", help="the error along y: largest, end, energy or phase"),
-=======
-                 help="draw this particle only, 0 or more (default: all)"),
->>>>>>> main
         _NAMES,
         _STEPS,
         _GROUP,
