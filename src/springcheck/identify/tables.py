@@ -90,7 +90,7 @@ class Table:
         for view, which in self._views.items():
             some = which[i]
             if np.any(some):
-                m[:, some] = _recorded(m[:, some], view)
+                m[:, some] = _recorded(m[:, some], a[some], view)
         return m
 
     def _powered(self, i: Any, a: Any, g: Any) -> Any:
@@ -179,14 +179,15 @@ def _rational(over: Any, under: Any, a: Any, g: Any) -> Any:
     return np.stack([x, y, -a * y, x - g * y])
 
 
-def _recorded(m: Any, view: int | str) -> Any:
-    """The map of q and of velocities that are recorded or made otherwise."""
+def _recorded(m: Any, a: Any, view: int | str) -> Any:
+    """The map of q and of velocities that are recorded or made otherwise; half a step is by the kick at q."""
     det = m[0] * m[3] - m[1] * m[2]
     back = np.stack([m[3], -m[1], -m[2], m[0]]) / det
     # v half a step ahead of the positions, or behind them, is that of kicks of half a step
     x, y = {
         1: lambda: m[2:], -1: lambda: back[2:], "mean": lambda: (m[:2] - back[:2]) / 2,
         "later": lambda: (m[0] - 1, m[1]), "earlier": lambda: (1 - back[0], -back[1]),
+        "half before": lambda: (a / 2, 1 + 0 * a), "half after": lambda: (-a / 2, 1 + 0 * a),
     }[view]()  # fmt: skip
     one, two, three, four = m[0] - m[1] * x / y, m[1] / y, m[2] - m[3] * x / y, m[3] / y
     return np.stack([one, two, x * one + y * three, x * two + y * four])
