@@ -179,8 +179,10 @@ def test_a_step_that_takes_the_size_of_a_negative_step_is_told() -> None:
 
 
 def test_a_damped_motion_of_sixteen_steps_to_a_frame_is_named_without_its_step() -> None:
-    t, q, v = loop(
-        lambda h, q, v: (lambda x: (x[0], x[1] * np.exp(-0.35 * h)))(verlet(h, q, v)), np.full(1600, H)
-    )
+    def step(h: float, q: float, v: float) -> tuple[float, float]:
+        q, v = verlet(h, q, v)
+        return q, v * np.exp(-0.35 * h)
+
+    t, q, v = loop(step, np.full(1600, H))
     found = identify(t[::16], q[::16], v=v[::16], mass=M, stiffness=K)
     assert (found.scheme, found.stride) == ("velocity-verlet", 16), found
