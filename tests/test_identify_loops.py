@@ -154,7 +154,7 @@ def test_damping_by_a_factor_of_each_frame_shows_in_positions() -> None:
         rows.append(x)
         x, before = x + 0.9 * (x - before) - H * H * K / M * x, x
     said = identify(H * np.arange(200), np.array(rows), mass=M, stiffness=K, friction=0.23).statement
-    assert "friction 20 to 21.3 times the stated" in said, said
+    assert "times the stated (20 to 21.3 by where it acts)" in said, said
 
 
 @pytest.mark.parametrize(("late", "word"), [(-0.5, "half a step behind"), (0.5, "half a step ahead")])

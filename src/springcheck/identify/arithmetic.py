@@ -12,9 +12,6 @@ from springcheck.identify.measure import Map
 from springcheck.identify.record import Record
 from springcheck.identify.storage import BINARY, ROUNDING
 
-FIXED = 2.0**-33
-"""Quantum of forces in fixed point, relative to the largest force, as GPU platforms have it."""
-
 MOST_DRAG = 40.0
 """Drags over one step above which exp(-drag) is below every rounding."""
 
