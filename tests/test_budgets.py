@@ -37,7 +37,7 @@ TO_COME = {
     ("physics/exact",): 1520,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4900,
-    ("identify",): 6110,
+    ("identify",): 6125,
     ("store",): 2670,
     ("formats",): 1591,
     ("studies",): 6450,

@@ -21,8 +21,8 @@ FEWEST_AT_LIMIT = 4
 """Frames that have to lie at one largest value for it to be a limit."""
 
 FAR_TIMES, STILL = 3.0, 0.05
-"""Ratio of the interval to the steps from which on the times are wrong, whatever the scheme, and the most that a
-frame may change a state by itself."""
+"""Ratio of the interval to the steps from which on the times are wrong, whatever the scheme, and the largest
+change of a state from frame to frame."""
 
 SOLVED = 1e-4
 """Largest error of an implicit step that is solved to a tolerance, relative to the state."""
