@@ -34,12 +34,11 @@ BUDGETS = {
 
 TO_COME = {
     ("physics",): 3800,
-    ("physics/exact",): 1520,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4900,
     ("identify",): 6125,
-    ("store",): 2670,
-    ("formats",): 1591,
+    ("store",): 2655,
+    ("formats",): 1531,
     ("studies",): 6450,
     ("figures",): 2600,
     ("cli",): 3230,

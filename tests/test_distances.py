@@ -10,6 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+import precession
 import springcheck
 from springcheck.cli import main
 from springcheck.errors import SceneError
@@ -121,26 +122,14 @@ def test_a_file_of_17_digits_is_judged(scene: str, scheme: str, tmp_path: Path) 
     assert main([*given, other]) == 1
 
 
-def axis(q: np.ndarray, p: np.ndarray, m: float, strength: float) -> np.ndarray:
-    """Angle of the Laplace-Runge-Lenz vector p x L - m k q/|q| at each frame."""
-    turn = q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]
-    unit = q / np.hypot(*q.T)[:, None]
-    return np.unwrap(
-        np.arctan2(*(np.stack([p[:, 1], -p[:, 0]], axis=1) * turn[:, None] - m * strength * unit).T[::-1])
-    )
-
-
-def test_velocity_verlet_turns_the_ellipse_by_h_squared_in_every_orbit() -> None:
-    scene = springcheck.load_scene("kepler")
-    m, k = float(scene.m[0]), float(scene.terms[0].parameters[0][0])
-    orbit = 2 * np.pi * np.sqrt(m * 8 / k)
-    turned = []
-    for parts in (400, 800, 1600):
-        run = springcheck.simulate(replace(scene, step=orbit / parts, steps=parts), "own:velocity-verlet")
-        turned.append(np.ptp(axis(run.q, run.p, m, k)[[0, -1]]))
-        moment = run.q[:, 0] * run.p[:, 1] - run.q[:, 1] * run.p[:, 0]
-        assert np.ptp(moment) < 1e-12
-    assert np.array(turned[:-1]) / np.array(turned[1:]) == pytest.approx([4, 4], rel=0.04)
+@pytest.mark.parametrize("scheme", ["velocity-verlet", "position-verlet", "semi-implicit-euler", "ruth3"])
+def test_verlet_turns_an_ellipse_by_its_law(scheme: str) -> None:
+    for m, strength, a, e in ((0.7, 1.5, 2.0, 0.5), (3.1, 0.4, 0.9, 0.2)):
+        for steps, off in ((500, 3e-3), (1000, 8e-4)):
+            found, change = precession.turned(precession.orbit(m, strength, a, e, steps), strength, scheme)
+            assert change < 1e-12
+            law = precession.law(e, 2 * np.pi / steps)
+            assert (abs(found / law - 1) < off) is (scheme != "ruth3")
 
 
 def test_ends_at_one_place_are_refused_in_a_line() -> None:

@@ -44,7 +44,7 @@ def test_the_steps_are_the_formulas() -> None:
     verlet = ["  p = p + 1/2 h F", "  q = q + h p/m", "  p = p + 1/2 h F"]
     assert list(explain.lines("velocity-verlet"))[1:4] == verlet
     assert "  y = y + h (1/6 f(Y1) + 1/3 f(Y2) + 1/3 f(Y3) + 1/6 f(Y4))" in explain.lines("rk4")
-    assert "Order 1; not symplectic; bounded on a spring: no step" in explain.lines("own:euler")
+    assert "Order 1; not symplectic; stable on a spring: never" in explain.lines("own:euler")
 
 
 def test_every_method_is_explained_whether_its_engine_is_here_or_not() -> None:

@@ -1,6 +1,6 @@
 """The own methods are the blog's two Euler loops and the schemes of the catalogue, to the last bit.
 
-What is compiled equals what is interpreted bit for bit, however it is cut and on however many threads; one
+What is compiled equals what is interpreted bit for bit; one
 step is the scheme's own map up to rounding.
 """
 
@@ -22,7 +22,7 @@ import pytest
 
 from springcheck import checks, driver, engines, schemes
 from springcheck.engines import Need, parse
-from springcheck.engines.own import ENGINE, compiled, kernels, laws, loops, simulation, solver, tiles
+from springcheck.engines.own import ENGINE, compiled, kernels, laws, loops, simulation, solver
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
@@ -108,10 +108,9 @@ def run(
     compiled: bool | None = None,
     every: int = 1,
     frames: int = 200,
-    threads: int = 1,
 ) -> tuple[Floats, Floats]:
     q, p = np.empty((frames, what.n)), np.empty((frames, what.n))
-    started = simulation.prepare(what, scheme, what.step, compiled=compiled, threads=threads)
+    started = simulation.prepare(what, scheme, what.step, compiled=compiled)
     started.advance(every, q, p)
     return q, p
 
@@ -397,39 +396,14 @@ def springs(n: int) -> Scene:
     return scene(m, rng.normal(size=n), rng.normal(size=n), wall(k, at))
 
 
-@pytest.mark.parametrize(
-    "scheme",
-    ["semi-implicit-euler", "explicit-euler", "velocity-verlet", "yoshida4", "rk4", "implicit-midpoint",
-     "trapezoidal"],
-)  # fmt: skip
-@pytest.mark.parametrize("make", [springs, chain, lambda n: chain(n, held=True)])
-def test_neither_tiles_nor_threads_change_a_number(
-    scheme: str, make: Callable[[int], Scene], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    n = 2 * 96 + 77
-    # so long a step that what a neighbour does is no rounding after as many steps as there are neighbours
-    what = replace(make(n), step=0.7)
-    plain_q, plain_p = run(what, scheme, compiled=False, frames=60)
-    for name, value in {"WIDTH": 96, "NARROW": 64, "MARGIN": 17, "PARALLEL": 0, "MANY_STEPS": 7}.items():
-        monkeypatch.setattr(tiles, name, value)
-    for threads in (1, 3):
-        for every, frames in ((1, 60), (3, 20), (30, 2), (60, 1)):
-            q, p = run(what, scheme, compiled=True, every=every, frames=frames, threads=threads)
-            assert np.array_equal(q, plain_q[every - 1 :: every])
-            assert np.array_equal(p, plain_p[every - 1 :: every])
-
-
 @pytest.mark.parametrize("scheme", ["velocity-verlet", "yoshida4", "rk4", "trapezoidal"])
 @pytest.mark.parametrize("make", [springs, chain])
 def test_calls_of_few_and_of_many_steps_by_turns_change_no_number(
-    scheme: str, make: Callable[[int], Scene], monkeypatch: pytest.MonkeyPatch
+    scheme: str, make: Callable[[int], Scene]
 ) -> None:
-    """They are cut into unlike tiles, and the force kept by one is not that of where another leads."""
-    what = make(2 * 96 + 77)
+    what = make(77)
     plain_q, plain_p = run(what, scheme, compiled=False, frames=60)
-    for name, value in {"WIDTH": 96, "NARROW": 64, "MARGIN": 17, "MANY_STEPS": 7}.items():
-        monkeypatch.setattr(tiles, name, value)
-    started = simulation.prepare(what, scheme, what.step, compiled=True, threads=1)
+    started = simulation.prepare(what, scheme, what.step, compiled=True)
     done = 0
     for steps in (1, 9, 1, 20, 3, 8, 2, 16):
         q, p = np.empty((2, 1, what.n))
@@ -437,17 +411,6 @@ def test_calls_of_few_and_of_many_steps_by_turns_change_no_number(
         done += steps
         assert np.array_equal(q[0], plain_q[done - 1])
         assert np.array_equal(p[0], plain_p[done - 1])
-
-
-def test_a_tile_without_its_margin_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    what = chain(300)
-    monkeypatch.setattr(tiles, "WIDTH", 96)
-    right = run(what, "velocity-verlet", compiled=True, every=60, frames=1)[0]
-    each = tiles.Tiled._each
-    monkeypatch.setattr(
-        tiles.Tiled, "_each", lambda self, go, width, margin, *rest: each(self, go, width, 2, *rest)
-    )
-    assert not np.array_equal(run(what, "velocity-verlet", compiled=True, every=60, frames=1)[0], right)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -475,12 +438,13 @@ def test_nothing_is_compiled_within_advance() -> None:
         for scheme in ("yoshida4", "rk4"):
             what = random_scene(layout, 1, scheme)
             started = simulation.prepare(what, scheme, what.step, compiled=True)
-            known: Any = started._how._job.kernel if hasattr(started._how, "_job") else started._how._kernel
-            before = list(known.signatures)
+            known: Any = list(compiled._COMPILED.values())
+            before = [list(kernel.signatures) for kernel in known]
             for shape in ((1, what.n), (6, what.n), (0, what.n)):
                 started.advance(2, np.empty(shape), np.empty(shape))
             started.advance(2, np.empty((6, what.n))[::2], np.empty((3, what.n), order="F"))
-            assert known.signatures == before != []
+            assert known == list(compiled._COMPILED.values())
+            assert [list(kernel.signatures) for kernel in known] == before != []
 
 
 def grid(width: int, k: float, seed: int = 5) -> Scene:

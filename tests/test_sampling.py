@@ -100,6 +100,6 @@ def test_the_study_is_kept_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -
     assert [x.name for x in limit.curves] == ["BAOA", "own:baoa"]
     # a law is no line between six points
     assert len(limit.curves[0].x) > 50
-    assert "1 of 2 schemes right to 1 %; Bussi " in bank.heading
+    assert "1 of 2 schemes right to 1 %; Bussi: " in bank.foot
     assert main(["plot", "s.h5"]) == 0
     assert Path("figures/s/sampling.png").stat().st_size > 10_000

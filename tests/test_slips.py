@@ -271,9 +271,7 @@ def test_a_step_that_an_adaptive_solver_cannot_follow_is_refused_with_its_radian
 def test_a_run_that_decays_into_subnormal_numbers_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     Path("s.toml").write_text(SPRING.replace("steps = 200", "steps = 160000") + "\n[record]\nevery = 1600\n")
     assert main(["run", "s.toml", "--method", "own:implicit-euler"]) == 0
-    assert "own:implicit-euler: complete after step 160000: it has decayed below 2.2e-308" in (
-        capsys.readouterr().out
-    )
+    assert "own:implicit-euler: it has decayed below 2.2e-308" in (capsys.readouterr().out)
     assert springcheck.simulate(springcheck.load_scene("spring"), "own:implicit-euler").outcome.message == ""
 
 

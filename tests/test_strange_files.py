@@ -181,6 +181,12 @@ XYZ = "".join(
 )
 
 
+def test_positions_alone_of_atoms_are_positions_alone() -> None:
+    Path("x.xyz").write_text("".join(f"1\nt = {t}\nAr {q} 0 0\n" for t, q in zip(T, Q, strict=True)))
+    found = read("x.xyz")
+    assert (found.q[:, 0].tolist(), found.v) == (Q.tolist(), None)
+
+
 def test_other_atoms_are_not_taken_for_the_same() -> None:
     Path("x.dump").write_text(dump(lambda i: 1 if i < 7 else 2))
     with pytest.raises(StoreError, match="frame 7 has other atoms than the first"):
@@ -199,7 +205,7 @@ def trr(atoms: Callable[[int], int]) -> bytes:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("x.trr", trr(lambda i: 1 + (i > 5)), "not of as many particles each"),
+        ("x.trr", trr(lambda i: 1 + (i > 5)), "the number of particles changes from frame to frame"),
         ("x.csv.gz", gzip.compress(table(T, Q, V).encode())[:-9], "packed is damaged or cut off"),
         ("x.csv.gz", gzip.compress(bytes(9999))[:10] + b"\xff" * 99, "packed is damaged or cut off"),
         ("x.dump", dump(lambda i: 1)[:-9].encode(), "fewer words than it should have"),
@@ -412,6 +418,9 @@ def test_energies_alone_are_said_to_be_that(head: str) -> None:
     Path("x.csv").write_text(table(*many, head=head))
     with pytest.raises(StoreError, match=r"energies alone.*changes by .* of its size.*record positions"):
         read("x.csv")
+    np.savez("x.npz", t=T, E_tot=np.stack([Q, V], axis=1))
+    with pytest.raises(StoreError, match=r"energies alone.*E_tot changes by"):
+        read("x.npz")
 
 
 def test_coordinates_as_gromacs_writes_them_are_those_of_its_atoms() -> None:

@@ -25,8 +25,6 @@ import random
 import re
 import resource
 import shutil
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -37,6 +35,7 @@ import h5py
 import numpy as np
 
 from arguments import arguments, script
+from interrupts import left
 from springcheck import store
 
 LABEL, OTHER = "own:euler", "own:semi-implicit-euler"
@@ -242,20 +241,12 @@ def numbers_that_are_none(file: Any, rng: random.Random, folder: Path) -> None:
     shape = file[name].shape
     values: Any = rng.choice(
         [
-            np.full(shape, np.inf),
-            np.full(shape, np.nan),
-            np.full(shape, 1 + 2j),
-            np.full(shape, 1e308),
-            np.full(shape, b"x"),
-            np.zeros(shape, "f2"),
-            np.zeros(shape, "O"),
-            np.full(shape, True),
-            np.zeros(shape, [("a", "f8")]),
-            np.zeros(shape, ">f8"),
-            np.zeros(shape, "u8"),
-            np.full(shape, -0.0),
+            np.full(shape, np.inf), np.full(shape, np.nan), np.full(shape, 1 + 2j),
+            np.full(shape, 1e308), np.full(shape, b"x"), np.zeros(shape, "f2"), np.zeros(shape, "O"),
+            np.full(shape, True), np.zeros(shape, [("a", "f8")]), np.zeros(shape, ">f8"),
+            np.zeros(shape, "u8"), np.full(shape, -0.0),
         ]
-    )
+    )  # fmt: skip
     if values.dtype == object:
         replace(file, name, shape, h5py.string_dtype())
     else:
@@ -266,22 +257,9 @@ def numbers_that_are_none(file: Any, rng: random.Random, folder: Path) -> None:
 def attributes_of_the_wrong_type(file: Any, rng: random.Random, folder: Path) -> None:
     node = rng.choice([file, file[f"parameters/{LABEL}"], file["verdicts"], file["comparison"], file["h5md"]])
     wrong = [
-        "text",
-        1.5,
-        -1,
-        0,
-        2**62,
-        np.nan,
-        np.inf,
-        np.zeros((2, 2)),
-        np.array([b"x"]),
-        np.zeros(0),
-        1 + 2j,
-        True,
-        h5py.Empty("f8"),
-        np.uint64(2**64 - 1),
-        np.zeros(1, [("a", "f8")]),
-    ]
+        "text", 1.5, -1, 0, 2**62, np.nan, np.inf, np.zeros((2, 2)), np.array([b"x"]), np.zeros(0),
+        1 + 2j, True, h5py.Empty("f8"), np.uint64(2**64 - 1), np.zeros(1, [("a", "f8")]),
+    ]  # fmt: skip
     for key in rng.sample(sorted(node.attrs), min(3, len(node.attrs))):
         if key != "format":
             node.attrs[key] = rng.choice(wrong)
@@ -420,58 +398,63 @@ def mutilate(file: Any, rng: random.Random) -> None:
         file[name] = rng.choice(wrong)
 
 
-def perform(path: str) -> None:
+def perform(path: Path, into: int) -> None:
     """Every command on one file, in this process: a line of JSON for each."""
     from springcheck.cli import main
 
     commands = [
-        ["check", path], ["inspect", path], ["identify", path], ["run", "--from", path],
-        ["judge", path, "--scene", "spring", "--scheme", "explicit-euler", "--trajectory", LABEL],
+        ["check"], ["inspect"], ["identify"], ["run", "--from"],
+        ["judge", "--scene", "spring", "--scheme", "explicit-euler", "--trajectory", LABEL],
     ]  # fmt: skip
     for command in commands:
         out, err = io.StringIO(), io.StringIO()
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-                status: object = main(command)
+                status: object = main([*command, str(path)])
         except BaseException as error:
             status = repr(error)
         both = [resource.getrusage(x) for x in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
         seconds = sum(x.ru_utime + x.ru_stime for x in both)
         memory = max(x.ru_maxrss for x in both) * 1024
         said = [command[0], status, out.getvalue()[-100_000:], err.getvalue()[-100_000:], seconds, memory]
-        print(json.dumps(said), file=sys.__stdout__, flush=True)
+        os.write(into, json.dumps(said).encode() + b"\n")
 
 
 def wrong(path: Path, folder: Path) -> list[str]:
-    """What should not be of the commands on a file."""
-    words = [sys.executable, __file__, "--perform", str(path)]
-    done = subprocess.run(
-        words, cwd=folder, capture_output=True, text=True, start_new_session=True, check=False, timeout=600
-    )
+    """What should not be of the commands on a file, in a process of their own."""
+    out, into = os.pipe()
+    if not (pid := os.fork()):
+        os.setsid()
+        os.chdir(folder)
+        perform(path, into)
+        os._exit(0)
+    os.close(into)
+    with os.fdopen(out) as pipe:
+        lines = pipe.readlines()
+    ended = os.waitpid(pid, 0)[1]
     found, before = [], 0.0
-    for line in done.stdout.splitlines():
-        name, status, out, err, seconds, memory = json.loads(line)
+    for line in lines:
+        name, status, said, err, seconds, memory = json.loads(line)
         if status not in (0, 1, 2):
             found.append(f"{name}: status {status}")
         if status == 2 and err.count("\n") != 1:
             found.append(f"{name}: said {err[:300]!r}")
-        if "Traceback" in err or re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", out + err):
+        if "Traceback" in err or re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", said + err):
             found.append(f"{name}: a traceback, or a control character")
-        if SECRET in out + err or "4711.08" in out + err:
+        if SECRET in said + err or "4711.08" in said + err:
             found.append(f"{name}: shows another file")
         if seconds - before > 20 or memory > 1 << 30:
             found.append(f"{name}: {seconds - before:.1f} s, {memory >> 20} MiB")
         before = seconds
-    if done.returncode or len(done.stdout.splitlines()) != 5:
-        found.append(f"ended with {done.returncode}: {done.stderr[-300:]!r}")
+    if ended or len(lines) != 5:
+        found.append(f"ended with {ended} after {len(lines)} commands")
+    if left(pid):
+        found.append("a process is left")
     return found
 
 
 def main() -> int:
     """Try every kind once, and so many damaged files."""
-    if sys.argv[1:2] == ["--perform"]:
-        perform(sys.argv[2])
-        os._exit(0)
     given = arguments(__doc__, files=200, seed=1)
     count = 0
     with tempfile.TemporaryDirectory() as name:

@@ -119,7 +119,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
         f"2 bad input, nothing was measured, or an engine failed; {interrupts.STATUS} interrupted; "
-        "141 nobody reads the output.",
+        "141 broken pipe.",
     )
     version = f"springcheck {springcheck.__version__}"
     parser.add_argument("--version", action="version", version=version, help="print the version and exit")

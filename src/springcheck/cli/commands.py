@@ -57,7 +57,7 @@ def _plot(options: Namespace) -> int:
         raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
     ours = not options.columns and (not path.is_file() or formats.is_store(path))
     if ours and options.step is not None:
-        raise SpringcheckError(f"{path}: --step goes with the file of another program")
+        raise SpringcheckError(f"{path}: --step is for files of other programs; a store has its step")
     doubts = output.doubts(options.file) if ours else []
     with output.warned(options.file, doubts):
         if ours and options.trajectory is None:
@@ -220,7 +220,7 @@ def _look_on(
     """As `_look`, of a file of a scene, whose force is known."""
     from springcheck import schemes
     from springcheck.cli import taken
-    from springcheck.identify.steps import on_scene
+    from springcheck.identify.scenes import of_scene
     from springcheck.physics.scenefile import load_scene
 
     schemes.bring(schemes.UNKNOWN)
@@ -229,7 +229,7 @@ def _look_on(
             path, found = Path(file), load_scene(scene)
             states = taken.states_in(path, columns, stated["step"], trajectory)
             judged, run, notes, _ = taken.as_trajectory(path, states, found, schemes.UNKNOWN.name)
-            return {path.name: on_scene(judged, run, notes)}, []
+            return {path.name: of_scene(judged, run, notes)}, []
     except (SpringcheckError, OSError) as error:
         return error
 
@@ -299,90 +299,90 @@ KINDS = ("scenes", "methods", "checks", "terms", "schemes")
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
 _NAMES = argument(
-    "--columns", metavar="NAMES", help="a table's columns, as t,q,v, - leaves one out; of HDF5 as t=a,q=b,v=c"
+    "--columns", metavar="NAMES", help="names of the columns, as t,q,v (- skips one); of HDF5 t=a,q=b,v=c"
 )
 _STEPS = argument("--step", "--dt", type=float, metavar="H", help="the time step of a file that counts steps")
 
 COMMANDS = (
-    Command("inspect", "what is in a store", _inspect, (
+    Command("inspect", "print what a store contains", _inspect, (
         _FILE,
         argument("--trajectory", metavar="LABEL",
                  help="print the numbers of one trajectory, first to last frame"),
-        argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
+        argument("--rows", type=int, metavar="N", help="number of frames to print (default 20)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         JSON,
         ENGINE,
     )),
-    Command("plot", "draw what is in a store, or in a file of any program, as PNG and SVG", _plot, (
+    Command("plot", "draw a store, or a trajectory of any program, as PNG and SVG", _plot, (
         _FILE,
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         argument("--particle", type=int, metavar="I",
-                 help="the motion of this particle alone, from 0 on (default: of all)"),
+                 help="draw this particle only, 0 or more (default: all)"),
         _NAMES,
         _STEPS,
         _GROUP,
         QUIET,
         ENGINE,
     )),
-    Command("report", "a store as one HTML page that checks itself in a browser", _report, (
+    Command("report", "write a store as one HTML page that checks itself", _report, (
         _FILE,
         argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html"),
         QUIET,
         ENGINE,
     )),
-    Command("show", "a shipped scene as a file to start from", _show, (
+    Command("show", "print a shipped scene file, to start from", _show, (
         argument("scene", metavar="SCENE"),
-        argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
+        argument("-o", "--output", metavar="MY.toml", help="write it to this new file"),
     )),
-    Command("explain", "a check, scheme, fault or finding in words", _explain, (
+    Command("explain", "explain a check, scheme, fault, finding or term", _explain, (
         argument("word", metavar="NAME", help="a check, scheme, engine:method, fault, finding or term"),
         ENGINE,
     )),
-    Command("cite", "what to cite for springcheck, its engines and schemes", _cite, (
-        argument("store", metavar="FILE", nargs="?", help="a store: its engines and schemes alone"),
+    Command("cite", "print what to cite: springcheck, engines, schemes", _cite, (
+        argument("store", metavar="FILE", nargs="?", help="a store, whose engines and schemes to cite"),
     )),
-    Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
+    Command("identify", "identify the scheme behind a trajectory of any program", _identify, (
         argument("files", metavar="FILE", nargs="*", help=f"stores, or files of any program: {FORMATS}"),
         _GROUP,
-        argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
-        argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
+        argument("--stiffness", type=float, metavar="K", help="the stiffness, which is tested"),
+        argument("--friction", type=float, metavar="C", help="the c of a friction -c v, which is tested"),
         argument("--mass", type=float, metavar="M",
                  help="mass of every particle in the file's unit (default: the file's)"),
         _NAMES,
-        argument("--step", "--dt", type=float, metavar="H", help="is this the time step?"),
-        argument("--scheme", metavar="NAME", help="is this the scheme?"),
-        argument("--scene", metavar="SCENE", help="the scene that it is of: schemes are tried by its force"),
+        argument("--step", "--dt", type=float, metavar="H", help="the time step, which is tested"),
+        argument("--scheme", metavar="NAME", help="the scheme, which is tested"),
+        argument("--scene", metavar="SCENE", help="the scene of the trajectory, whose force is used"),
         argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
         argument("--workers", type=processes, default=1, metavar="N",
-                  help="processes that look at many files (default 1)"),
+                  help="number of processes for many files (default 1)"),
         JSON,
     )),
-    Command("judge", "is a trajectory of any program what its scheme promises", _judge, (
+    Command("judge", "judge a trajectory of any program by its scheme", _judge, (
         argument("file", metavar="FILE", help=f"a store, or a file of any program: {FORMATS}"),
-        argument("--scene", required=True, metavar="SCENE", help="the scene that it is of"),
-        argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have"),
+        argument("--scene", required=True, metavar="SCENE", help="the scene of the trajectory"),
+        argument("--scheme", metavar="NAME", help="the scheme to judge it by (default: the one it shows)"),
         _NAMES,
         _GROUP,
         _STEPS,
         argument("--differences", action="store_true",
-                 help="its velocities are differences of positions, which keep eps q/h of them"),
+                 help="velocities are differences of positions, rounded by eps q/h"),
         argument("--arithmetic", metavar="LABEL",
-                 help="it rounds as this method does: openmm:verlet@CUDA-mixed (default: in double)"),
-        argument("--partial", action="store_true", help="let a file pass that covers a part of the scene"),
+                 help="judge with the rounding of this method, as openmm:verlet@CUDA-mixed"),
+        argument("--partial", action="store_true", help="accept a file that covers a part of the scene"),
         argument("--verdicts", action="store_true", help="print every check with its reason"),
         JSON,
         ENGINE,
     )),
-    Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE, ENGINE)),
-    Command("export", "one trajectory as a file of its own, for other tools", _export, (
+    Command("check", "verify the digests and the structure of a store", _check, (_FILE, ENGINE)),
+    Command("export", "export one trajectory for other tools", _export, (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
-    Command("list", "scenes, methods, checks, terms and schemes", _list, (
+    Command("list", "list scenes, methods, checks, terms and schemes", _list, (
         argument("kind", nargs="?", choices=KINDS, help="one page of the list (default: an overview)"),
         JSON,
         ENGINE,
     )),
-    Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
+    Command("doctor", "report what this installation can do, and what is missing", _doctor, (JSON,)),
 )  # fmt: skip
 """Every command that is no study, in the order of `--help`."""

@@ -21,6 +21,9 @@ from springcheck.text.wording import count
 MOST_COORDINATES = 8
 """Most coordinates that are drawn of another program's file."""
 
+LIKE_SIZES = 2.5
+"""Ratio of the ranges of q and p up to which their axes have one scale."""
+
 FEWEST_PERIOD_FRAMES = 12
 """Fewest frames of a period that lines may join."""
 
@@ -114,8 +117,13 @@ def draw_foreign(
         ]
 
     q, t, y = (Scale(name=with_unit(x, found.units.get(x, ""))) for x in ("q", "t", name))
+    with np.errstate(all="ignore"):
+        wide, high = np.nanmax(np.ptp(found.q[:, chosen], axis=0)), np.nanmax(np.ptp(other, axis=0))
+        # of like sizes a circle is to be seen as one
+        equal = bool(1 / LIKE_SIZES < wide / high < LIKE_SIZES)
+    orbit = curves(found.q, other, joined=False)
     charts = [
-        Chart(title=f"{name} over q.", x=q, y=y, curves=curves(found.q, other, joined=False)),
+        Chart(title=f"{name} over q.", x=q, y=y, curves=orbit, equal=equal),
         Chart(title="q over time.", x=t, y=q, curves=curves(found.t[:, None], found.q, joined=True)),
     ]
     heading = f"{path.name}{f', {trajectory}' if trajectory else ''}: {count(len(found.t), 'frame')}"

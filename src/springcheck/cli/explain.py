@@ -166,14 +166,14 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
     elif not scheme.has("one-step"):
         yield "  a solver that chooses its own steps; no one-step map"
     else:
-        bounded = {0.0: "no step", math.inf: "every step"}.get(scheme.limit)
+        bounded = {0.0: "never", math.inf: "always"}.get(scheme.limit)
         area = "symplectic" if scheme.has("symplectic") else "not symplectic"
         if scheme.has("symplectic", "friction"):
             area = "conformally symplectic: area falls by exp(-h c/m) per step; conserved without friction"
         where = bounded or f"h omega up to {scheme.limit:.6g}"
         braked = scheme.braked_order
         lower = f" ({braked} with friction)" if braked < scheme.order else ""
-        yield f"Order {scheme.order}{lower}; {area}; bounded on a spring: {where}"
+        yield f"Order {scheme.order}{lower}; {area}; stable on a spring: {where}"
     if scheme.source:
         yield _line(f"Source: {scheme.source}")
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from springcheck import engines, schemes
 from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
+from springcheck.engines.solvers import timed
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper
 from springcheck.identify.pair import returned
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.schemes import UNKNOWN
 

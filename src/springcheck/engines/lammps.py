@@ -32,9 +32,9 @@ from springcheck.engines.contract import (
     named,
     thermostat,
 )
+from springcheck.engines.solvers import timed
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring

@@ -24,8 +24,8 @@ from springcheck.engines.contract import (
     named,
     version_of,
 )
+from springcheck.engines.solvers import timed
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.schemes import solver
 
@@ -44,6 +44,10 @@ EXPLICIT_SOLVERS = ("RK45", "DOP853")
 
 SMALLEST_TOLERANCE = 100 * np.finfo(np.float64).eps
 """Smallest relative tolerance that SciPy takes; it raises smaller ones to this."""
+
+
+MOST_CALLS, MOST_A_STEP = 100_000, 2_000
+"""Force calls, some seconds, from which on a run stops that takes so many of them in each step."""
 
 
 class _Solver:
@@ -84,6 +88,10 @@ class _Solver:
             for row in range(len(q)):
                 t = (self._done + every) * self._h
                 while abs(solver.t) < abs(t) and solver.status == "running":
+                    if self.force_calls > max(MOST_CALLS, MOST_A_STEP * (self._done + every)):
+                        of = self.force_calls // (self._done + every)
+                        raise Stopped(row, f"{of:,} force calls a step: too many at this tolerance; use "
+                                           "shorter steps, or a larger tolerance")  # fmt: skip
                     message = solver.step()
                     self._dense = None
                     if solver.status == "failed":

@@ -1,13 +1,16 @@
-"""How far an adaptive solver has to integrate between two outputs."""
+"""What adaptive solvers take, and how far they have to integrate between two outputs."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
+from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
 
 OF_CVODE, OF_DOP853 = (3.0, 40e-6), (1 / 6, 250e-6)
@@ -65,3 +68,18 @@ def refuse_hours(scene: Scene, label: Label, step: float, *, explicit: bool = Fa
             f"{each * radians:.0e} internal steps or more, some {took / 3600:.2g} hours; one is the "
             "most, take shorter steps or record more frames"
         )
+
+
+def timed(scene: Any) -> tuple[Callable[[float, Floats, Floats], Floats], ...]:
+    """For a solver with its own time, as functions of (t, q, p): the force (n,) [M L/T2], and the derivatives
+    (2n, 2n) of (p/m, force) by (q, p)."""
+    system, n = scene.system, scene.n
+    if not system.is_driven:
+        return lambda t, q, p: system.force(q, p), lambda t, q, p: system.jacobian(q, p)
+    clocked = system.clocked.system
+    kept = np.append(np.arange(n), np.arange(n + 1, 2 * n + 1))
+
+    def force(t: float, q: Floats, p: Floats) -> Floats:
+        return np.asarray(clocked.force(np.append(q, t), np.append(p, CLOCK))[:n], np.float64)
+
+    return force, lambda t, q, p: clocked.jacobian(np.append(q, t), np.append(p, CLOCK))[np.ix_(kept, kept)]

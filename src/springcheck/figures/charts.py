@@ -71,7 +71,7 @@ class Tiles:
     """A map over two axes of values: `rows` holds, for each y, an index into `kinds` for each x, or -1."""
 
     kinds: Sequence[tuple[str, str]]
-    """Name and shade of each: good, wild, limit, refused, wrong; or of sizes s0 to s6."""
+    """Name and shade of each: good, wild, limit, refused, wrong."""
     rows: Sequence[Sequence[int]]
     notes: Sequence[Sequence[str]] = ()
     """Annotation of each tile next to its kind; none by default."""
@@ -98,6 +98,8 @@ class Naming:
     x: float
     y: float
     """Fractions of the width and height of the axes."""
+    below: bool = False
+    """Whether it hangs below its point, inside the axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

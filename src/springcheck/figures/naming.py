@@ -24,9 +24,8 @@ from springcheck.physics.arrays import Floats
 MOST_NAMINGS, NAME_HIGH = 9, 0.052
 """Most curves with a label on them, and the height of a label as a fraction of the axes'."""
 
-NAME_AWAY, LETTER, NAME_PLACES = 0.03, 0.018, 60
-"""Distance of a label from other curves and width of a letter, as fractions of the axes; and points at which
-a label may find space."""
+LETTER = 0.018
+"""Width of a letter as a fraction of the axes."""
 
 
 Place = tuple[str, str, Floats, Floats]
@@ -55,23 +54,15 @@ def _named(chart: Chart, *, by_name: bool = False) -> list[Place]:
 
 
 def at_ends(chart: Chart, *, height: float = NAME_HIGH) -> Chart:
-    """A chart with labels at the ends of its curves over time, next to the axes, or where they leave them.
+    """A chart with labels at the ends of its curves over time, next to the axes.
 
     They are moved apart by the height of a line of text.
     """
     ends: list[tuple[float, str, str]] = []
-    out: list[Naming] = []
     for text, group, u, v in _named(chart):
         inside = np.flatnonzero((u >= -0.01) & (u <= 1.01) & (v >= -0.01) & (v <= 1.01))
-        if not len(inside):
-            continue
-        last = int(inside[-1])
-        if u[last] > 0.9:
-            ends.append((float(v[last]), text, group))
-        elif not any(
-            abs(v[last] - one.y) < height and abs(u[last] - one.x) < LETTER * len(text) for one in out
-        ):
-            out.append(Naming(text=text, group=group, x=float(u[last]) + 0.01, y=min(0.9, float(v[last]))))
+        if len(inside) and u[inside[-1]] > 0.9:
+            ends.append((float(v[inside[-1]]), text, group))
     ends.sort()
     most = min(MOST_NAMINGS, int(1 / height))
     if len(ends) > most:
@@ -89,34 +80,20 @@ def at_ends(chart: Chart, *, height: float = NAME_HIGH) -> Chart:
     beside = [
         Naming(text=text, group=group, x=1.0, y=y) for y, (_, text, group) in zip(places, ends, strict=True)
     ]
-    return replace(chart, labels=[*out[:MOST_NAMINGS], *beside])
+    return replace(chart, labels=beside)
 
 
-def labelled(chart: Chart, *, by_name: bool = False) -> Chart:
-    """A chart with labels on the curves that are well separated somewhere, each where it is farthest from all
-    others."""
-    points: dict[tuple[str, str], Floats] = {}
-    for text, group, u, v in _named(chart, by_name=by_name):
-        inside = (u > 0.02) & (u < 0.98) & (v > 0.03) & (v < 0.95)
-        points[text, group] = np.stack([u[inside], v[inside]], axis=1)
+def at_their_ends(chart: Chart) -> Chart:
+    """A chart with the names of its curves below their ends, inside the axes; moved apart by a line of text
+    where they would overlap.  Of many curves none is named: the legend does that."""
+    ends = []
+    for text, group, u, v in _named(chart, by_name=True):
+        inside = np.flatnonzero((u > 0) & (u < 1) & (v > 0) & (v < 1))
+        if len(inside):
+            ends.append((float(v[inside[-1]]), float(u[inside[-1]]), text, group))
     out: list[Naming] = []
-    # faults come first, lines that are no scheme's last
-    order = sorted(points.items(), key=lambda x: (x[0][1] != REJECTED, x[0][1] == SEPARATRIX))
-    for (text, group), mine in order:
-        others = np.concatenate([np.empty((0, 2)), *(x for key, x in points.items() if key != (text, group))])
-        best, found = NAME_AWAY, None
-        for x, y in mine[:: max(1, len(mine) // NAME_PLACES)].tolist():
-            # where its words stand
-            at = np.array(
-                [[x + s * 0.2 * LETTER * len(text) * (1 if x < 0.6 else -1), y + 0.02] for s in range(6)]
-            )
-            room = [float(np.min(np.hypot(*(others - place).T), initial=1.0)) for place in at]
-            taken = any(abs(y - one.y) < NAME_HIGH and abs(x - one.x) < LETTER * len(text) for one in out)
-            if not taken and min(room) > best:
-                best, found = min(room), (x, y)
-        if by_name and found is None and len(mine):
-            # where it ends
-            found = tuple(mine[-1].tolist())
-        if found is not None and len(out) < MOST_NAMINGS:
-            out.append(Naming(text=text, group=group, x=found[0], y=found[1]))
+    for y, x, text, group in sorted(ends) if len(ends) <= MOST_NAMINGS else []:
+        near = [one.y for one in out if abs(one.x - x) < LETTER * max(len(text), len(one.text))]
+        lowest = max([NAME_HIGH, *(taken + NAME_HIGH for taken in near)])
+        out.append(Naming(text=text, group=group, x=x, y=max(y, lowest), below=True))
     return replace(chart, labels=out)

@@ -221,7 +221,7 @@ def exact_curve(x: Floats, y: Floats) -> Curve:
 
 
 def share(x: float) -> str:
-    """A fraction in a readable form: in percent, or as a power of ten."""
+    """A fraction in a readable form: in percent, as a power of ten, or in times."""
     if not 5e-4 <= x < 1000:
-        return f"{x:.0e}" if x else "0"
+        return f"{x:,.0f} times" if 1000 <= x < 1e6 else f"{x:.0e}" if x else "0"
     return f"{100 * x:.2g} %" if x < 0.995 else f"{100 * x:.0f} %"

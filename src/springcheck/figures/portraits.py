@@ -29,7 +29,7 @@ JUMP, MANY_POINTS, TO_AND_FRO = 0.3, 1000, 0.25
 """Distance of two points, in half axes, that is a jump in a curve of many points; and the fraction of all
 frames from which on a run is taken to jump to and fro."""
 
-STEEP, START_SHOWN = 30.0, 8.0
+STEEP, START_SHOWN = 30.0, 3.0
 """Reach, in medians, from which on a motion runs away; and what is shown of it, in reaches of its start."""
 
 STANDS, SOON = 0.02, 0.1
@@ -99,7 +99,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked[runs.every[0].label] if true is None else true) is None else ""
     of = f" of {view.title}" if view.title and view.what != "path" else ""
-    chart = Chart(
+    return Chart(
         title=f"{view.y_name} over {view.x_name}{of}.".capitalize(),
         short="" if alone else view.title,
         x=xs.axis(view.x_name, view.x_unit),
@@ -108,7 +108,6 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
         equal=square and (view.what == "path" or max(sizes) <= ALIKE * min(sizes)),
         note=note,
     )
-    return naming.labelled(chart) if alone else chart
 
 
 def clouds(runs: Runs, view: View, thermal: float) -> Bank:
@@ -194,8 +193,9 @@ def _steep(motion: State) -> tuple[Frame, Frame] | None:
 
 
 def _sparse(truth: Motion | None, view: View, *frames: Frame) -> bool:
-    """Whether lines between points of the exact solution visibly miss it, in a tenth of the points: by a
-    quarter of a point's distance from the line between its neighbours."""
+    """Whether straight lines between points of the exact solution visibly miss it at a tenth of the points.
+
+    The miss is estimated as a quarter of a point's distance from the line between its neighbours."""
     if truth is None or len(truth[0]) < 3:
         return False
     t, *motion = truth[0], *view.pick(truth[1], truth[2])

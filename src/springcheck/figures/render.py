@@ -34,8 +34,6 @@ from springcheck.physics.arrays import Floats
 
 TILES_SHADED = {
     "good": "#9ecae1", "wild": "#fee391", "limit": "#8c6bb1", "refused": "#bdbdbd", "wrong": "#dd0033",
-    "s0": "#fff7d6", "s1": "#fee08b", "s2": "#fdb863", "s3": "#f08a4b", "s4": "#cf4e4e", "s5": "#96295f",
-    "s6": "#4b1250",
 }  # fmt: skip
 """Colours of the kinds of tiles, as on the page's paper."""
 
@@ -214,12 +212,12 @@ def _chart(axes: Axes, chart: Chart, letters: int) -> None:
 
 def _label(axes: Axes, label: Naming) -> None:
     color = OTHER_LINES[label.group]["color"] if label.group in OTHER_LINES else looks.look(label.group).color
-    beside, left = label.x >= 1, label.x > 0.6
+    left = label.below and label.x > 0.55
     axes.annotate(
         textwrap.shorten(label.text, 34, placeholder="..."), (label.x, label.y), xycoords="axes fraction",
-        xytext=(6 if beside else -4 if left else 4, 0 if beside else 4), textcoords="offset points",
-        ha="left" if beside or not left else "right", va="center" if beside else "bottom", fontsize=7.5,
-        color=color, zorder=5, annotation_clip=False, path_effects=AROUND,
+        xytext=(-5 if left else 6, -4 if left else 0), textcoords="offset points",
+        ha="right" if left else "left", va="top" if left else "center", fontsize=7.5, color=color, zorder=5,
+        annotation_clip=False, path_effects=AROUND,
     )  # fmt: skip
 
 
@@ -301,9 +299,8 @@ def _rule(axes: Axes, rule: Rule, height: float) -> None:
     if rule.axis == "x":
         axes.annotate(rule.name, (rule.at, height), xycoords=("data", "axes fraction"), xytext=(3, -6), **how)
     else:
-        # errors begin small: their curves leave the left of the line at 1 free
-        place, how["ha"] = ((0.01, rule.at), "left") if rule.look == "one" else ((0.99, rule.at), "right")
-        axes.annotate(rule.name, place, xycoords=("axes fraction", "data"), xytext=(0, 3), **how)
+        # errors begin small, and end small where they cost most: the left of both lines is free
+        axes.annotate(rule.name, (0.01, rule.at), xycoords=("axes fraction", "data"), xytext=(0, 3), **how)
 
 
 def _tiles(axes: Axes, chart: Chart) -> None:

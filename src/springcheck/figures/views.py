@@ -11,7 +11,7 @@ import numpy as np
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine
+from springcheck.physics.terms import Cosine, VanDerPol
 
 MOST_PANELS = 4
 """Particles up to which each has a panel of its own."""
@@ -141,6 +141,9 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
     if scene.n == scene.particles > 2 and not system.is_separate and system.has_modes and scene.bath is None:
         y, v = (x[0] for x in system.modes.about_centres(scene.q[None], scene.p[None]))
         energies = np.asarray(v * v + np.abs(system.modes.w2) * y * y, np.float64)
+        # a mode that turns less than once is no circle
+        turns = np.abs(system.modes.w2) * float(scene.step * scene.steps) ** 2 > (2 * np.pi) ** 2
+        energies = np.where(turns | ~np.any(turns), energies, 0)
         strongest = np.argsort(-energies, kind="stable")[:MOST_PANELS]
         return [_mode(scene, int(i)) for i in strongest if energies[i] > WEAK_MODE * np.max(energies)]
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]
@@ -168,7 +171,26 @@ def paths(scene: Scene) -> list[View]:
     return [replace(one, title="") for one in found] if len(found) == 1 else found
 
 
+def _relaxing(scene: Scene, i: int, term: VanDerPol) -> View:
+    """Van der Pol's oscillator in Lienard's plane: it creeps along a cubic, and jumps between its arms."""
+    c, width, at = (float(x[term.i == i][0]) for x in (term.c, term.width, term.at))
+
+    def pick(q: Reals, p: Reals) -> State:
+        u = np.asarray(q[:, i], np.float64) - at
+        with np.errstate(over="ignore", invalid="ignore"):
+            return u + at, np.asarray(p[:, i], np.float64) / c - u + u**3 / (3 * width**2)
+
+    unit = units(scene)
+    return View(
+        title="" if scene.n == 1 else f"particle {i}", what="position", x_name="position q",
+        y_name="Li\u00e9nard's p/c \u2212 q + q\u00b3/3w\u00b2", x_unit=unit.q, y_unit=unit.q, pick=pick,
+    )  # fmt: skip
+
+
 def _single(scene: Scene, i: int) -> View:
+    for term in scene.terms:
+        if isinstance(term, VanDerPol) and np.any(term.i == i):
+            return _relaxing(scene, i, term)
     unit = units(scene)
     x_name, y_name = _NAMES[scene.kind]
     turns = {float(2 * np.pi / w) for t in scene.terms if isinstance(t, Cosine) for w in t.wave[t.i == i]}

@@ -114,8 +114,8 @@ def fitting(path: Path, found: States) -> States:
         return found
     fixed = found.fixed and Fixed(found.fixed.q * turned, found.fixed.v * factor, found.fixed.beside)
     units = {**found.units, "q": unit, "t": t, "v": f"{unit} {t}-1"}
-    q, v = found.q * turned, found.v * factor
-    return replace(found, q=q, v=v, fixed=fixed, units=units, notes=(*found.notes, *notes))
+    states = {"q": found.q * turned, "v": found.v * factor}
+    return replace(found, **states, fixed=fixed, units=units, notes=(*found.notes, *notes))
 
 
 def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
@@ -205,10 +205,12 @@ def _by_place(parts: Sequence[Floats], places: Sequence[tuple[str, float]]) -> F
     return np.asarray(np.hstack(parts)[:, np.lexsort((axis, particle, number))])
 
 
-def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float | None = None) -> States:
+def split(
+    path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float | None = None, finite: bool = True
+) -> States:
     """Named columns as states; without times, frames are a `step` apart, where it is stated.
 
-    StoreError names those that are missing or do not fit together.
+    StoreError names those that are missing, do not fit together or, where they must be, are not `finite`.
     """
     parts: dict[Kind, list[Floats]] = {}
     places: dict[Kind, list[tuple[str, float]]] = {}
@@ -249,7 +251,7 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float 
         if what != "t" and values.shape != (len(t), n):
             raise StoreError(f"{path}: columns of {what}: {values.shape[1]}, of q: {n}")
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(bad):
+        if len(bad) and finite:
             raise StoreError(f"{path}: row {bad[0] + 1} of {what} is not finite")
     if roundoff == 2.0**-53 and all(is_single(x) for what, x in states.items() if what != "t"):
         roundoff = 2.0**-24
@@ -266,13 +268,14 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53, step: float 
 
 
 def _energies_alone(path: Path, columns: Columns) -> None:
-    """StoreError where columns are energies: what they show, and what they do not."""
+    """Raise StoreError if the columns are energies, which identify no scheme."""
     found = {name: x for name, x in columns.items() if re.fullmatch(ENERGY, _parted(name)[0])}
     if not found:
         return
     parts = {name: x for name, x in found.items() if re.search("kin|pot", name, re.IGNORECASE)}
     whole = {name: x for name, x in found.items() if name not in parts}
-    name, total = next(iter(whole.items())) if whole else (" + ".join(parts), sum(parts.values()))
+    name = next(iter(whole), " + ".join(parts))
+    total = sum(np.reshape(x, (len(x), -1)).sum(axis=1) for x in ([whole[name]] if whole else parts.values()))
     size = float(np.max(np.abs(total))) or 1.0
     shown = f"{np.ptp(total) / size:.2g} of its size, {(total[-1] - total[0]) / size:+.2g} from start to end"
     raise StoreError(

@@ -7,6 +7,7 @@ import zipfile
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -72,14 +73,12 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
         from ase import units
 
         found = ase.io.read(str(path), index=f":{MOST_FRAMES}", format="traj")
-        if len({len(atoms) for atoms in found}) != 1:
-            raise StoreError(f"{path}: the number of atoms changes")
         v = [atoms.get_velocities() * units.fs for atoms in found if atoms.has("momenta")]
         if len(v) not in (0, len(found)):
             raise StoreError(f"{path}: some frames have velocities, and others have none")
         said = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
         t, q = clock(path, said, step, unit="fs"), [atoms.positions for atoms in found]
-        return of_frames(path, t, q, v or None, found[0].get_masses())
+        return replace(of_frames(path, t, q, v), mass=found[0].get_masses())
 
 
 def read_mat(path: Path, columns: list[str], step: float | None) -> States:

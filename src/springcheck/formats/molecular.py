@@ -8,19 +8,29 @@ from __future__ import annotations
 import struct
 from array import array
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import MOST_NUMBERS, Fixed, Floats, States, times
+from springcheck.formats.columns import MOST_NUMBERS, Floats, States, split, times
 from springcheck.formats.digits import SHOWN, fixed, number, roundoff
 from springcheck.formats.tables import Lines
 
 R, V, P = ("x", "y", "z"), ("vx", "vy", "vz"), ("px", "py", "pz")
 IMAGES = "ix", "iy", "iz"
 """Counters of the borders that wrapped positions have crossed."""
+
+
+def of_frames(path: Path, t: Any, q: Sequence[Any], v: Sequence[Any], coarse: float = 0.0) -> States:
+    """States of frames of as many particles each: q and v (n, 3), no v where there are none."""
+    if len({len(x) for x in q}) > 1:
+        raise StoreError(f"{path}: the number of particles changes from frame to frame")
+    columns = {name: np.reshape(x, (len(t), -1)) for name, x in (("t", t), ("q", q), ("v", v)) if len(x)}
+    return split(path, columns, max(coarse, 2.0**-53))
+
 
 Frame: TypeAlias = tuple[float | None, int, int, list[str]]
 """Time, number of the step, number of atoms, and names of their columns."""
@@ -37,28 +47,6 @@ def clock(
         how = "; give its time step, as --step H" * (step is None)
         raise StoreError(f"{path}: frame {[*said].index(None)} says no time, as others do{how}")
     return np.array(known)
-
-
-def of_frames(
-    path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float = 2.0**-53, fixed: Fixed | None = None
-) -> States:
-    """States of frames: t (f,), q and v (f, n, 3), v None where there are none, mass (n,) or None."""
-    try:
-        at, positions, velocities = (np.asarray(x, np.float64) for x in (t, q, q if v is None else v))
-    except (ValueError, TypeError) as error:
-        raise StoreError(f"{path}: its frames are no numbers, or not of as many particles each") from error
-    frames = len(positions) if positions.ndim else 0
-    if at.shape != (frames,) or positions.ndim != 3 or velocities.shape != positions.shape:
-        raise StoreError(
-            f"{path}: times {at.shape}, positions {positions.shape} and velocities {velocities.shape} do not "
-            "belong to the same frames and particles"
-        )
-    if frames < 2:
-        raise StoreError(f"{path}: holds {frames} frame; two are needed")
-    m = None if mass is None else np.repeat(np.asarray(mass, np.float64), positions.shape[2])
-    flat = None if v is None else velocities.reshape(frames, -1)
-    where = positions.reshape(frames, -1)
-    return States(t=at, q=where, p=None, v=flat, mass=m, roundoff=roundoff, fixed=fixed)
 
 
 def _read(path: Path, step: float | None, what: str, begins: Callable[[Lines], Iterator[Frame]]) -> States:
@@ -104,19 +92,20 @@ def _read(path: Path, step: float | None, what: str, begins: Callable[[Lines], I
             raise StoreError(f"{path}: frame {np.argmax(others)} has other atoms than the first, by their id")
     if "ix" in at and np.any(table[:, :, [at[name] for name in IMAGES]]):
         raise StoreError(f"{path}: positions are wrapped into a box; dump xu yu zu in place of x y z")
-    mass = table[0, :, at["mass"]] if "mass" in at else _masses(path, symbols)
-    rates = next((names for names in (V, P) if names[0] in at), ())
-    of = len(R), len(R) + len(rates)
+    columns = {name: table[:, :, i] for name, i in at.items() if name not in ("id", *IMAGES)}
+    columns["t"] = clock(path, [one[0] for one in heads], step, [one[1] for one in heads])[:, None]
     # LAMMPS writes 6 digits unless dump_modify asks for more
-    told = roundoff(first, range(of[1])), fixed(first, range(of[0]), range(*of))
-    q, v = table[:, :, : of[0]], table[:, :, of[0] : of[1]] if rates else None
-    if rates == P and v is not None and mass is not None:
+    rates = range(len(R), len(R) + len(V) * bool({*V, *P} & at.keys()))
+    known, decimals = roundoff(first, [*range(len(R)), *rates]), fixed(first, range(len(R)), rates)
+    if symbols and "mass" not in at:
+        columns["mass"] = np.tile(_masses(symbols), (len(heads), 1))
+    if P[0] in at and "mass" in columns:
         from ase.units import fs
 
-        v = v / mass[:, None] * fs
-        told = told[0], told[1] and told[1]._replace(v=told[1].v * np.repeat(fs / mass, 3))
-    t = clock(path, [one[0] for one in heads], step, [one[1] for one in heads])
-    return of_frames(path, t, q, v, mass, *told)
+        of_one = fs / columns["mass"][0]
+        columns |= {v: columns.pop(p) / columns["mass"] * fs for v, p in zip(V, P, strict=True)}
+        decimals = decimals and decimals._replace(v=decimals.v * np.repeat(of_one, 3))
+    return replace(split(path, columns, known), fixed=decimals)
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:
@@ -133,10 +122,8 @@ def _wanted(path: Path, names: list[str]) -> dict[str, int]:
     }
 
 
-def _masses(path: Path, symbols: list[str]) -> Floats | None:
-    """Masses of the elements, as ASE has them [u]; None where the file names no species."""
-    if not symbols:
-        return None
+def _masses(symbols: list[str]) -> Floats:
+    """Masses of elements, as ASE has them [u]."""
     from ase.data import atomic_masses, atomic_numbers
 
     return np.array([atomic_masses[atomic_numbers.get(symbol, 0)] for symbol in symbols])
@@ -256,4 +243,4 @@ def read_trr(path: Path, columns: list[str], step: float | None) -> States:
     if not found:
         raise StoreError(f"{path}: has no frame with both positions and velocities")
     t, q, v = zip(*found, strict=True)
-    return of_frames(path, t, q, v, None, written)
+    return of_frames(path, t, q, v, written)

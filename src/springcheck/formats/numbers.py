@@ -10,16 +10,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError, nearest, plain
-from springcheck.formats.columns import (
-    Floats,
-    States,
-    is_rate,
-    kind,
-    kinds,
-    listed,
-    named,
-    split,
-)
+from springcheck.formats.columns import Floats, States, is_rate, kind, kinds, listed, named, split
 from springcheck.physics.arrays import roundoff
 
 STATES = "y", "u", "state", "states", "sol", "solution", "z"
@@ -34,8 +25,9 @@ def of_table(path: Path, found: Any, names: Sequence[str], step: float | None = 
 
 
 def states_of(
-    path: Path, arrays: Mapping[str, Any], names: Sequence[str] = (), step: float | None = None
-) -> States:
+    path: Path, arrays: Mapping[str, Any], names: Sequence[str] = (), step: float | None = None,
+    finite: bool = True,
+) -> States:  # fmt: skip
     """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
 
     MATLAB and Octave write times as (1, f) or (f, 1), and may write columns as rows.  `names` select arrays
@@ -79,7 +71,7 @@ def states_of(
         for name, a in numbers.items()
         if meant.get(name) == "m" and name not in columns
     ]
-    states = split(path, columns, roundoff(*(numbers[name] for name in columns)), step)
+    states = split(path, columns, roundoff(*(numbers[name] for name in columns)), step, finite)
     return replace(states, mass=masses[0]) if masses else states
 
 

@@ -180,7 +180,7 @@ def _unequal(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def _stages(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
-    """RK4 whose stages take g times their steps."""
+    """RK4 with the step of every stage multiplied by g."""
     x, y = 1 - g * a / 2 + g**3 * a * a / 24, 1 - g * g * a / 6
     return x, y, -a * y, x
 

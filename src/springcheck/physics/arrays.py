@@ -45,6 +45,15 @@ Integers: TypeAlias = NDArray[np.int64]
 Force: TypeAlias = Callable[[Reals, Reals], Reals]
 """(q, p), each (..., n) -> force on every particle (..., n) [M L/T2]."""
 
+States: TypeAlias = tuple[Extended, Extended]
+"""q and p in extended precision."""
+
+
+def wide(x: Any) -> Extended:
+    """Doubles in extended precision."""
+    return np.asarray(x, np.longdouble)
+
+
 Class = TypeVar("Class")
 
 

@@ -8,7 +8,6 @@ phase space).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -76,18 +75,3 @@ def with_clock(scene: Any) -> Any:
     terms = tuple(replace(term, clock=True) if isinstance(term, Drive) else term for term in scene.terms)
     places = None if scene.places is None else np.append(scene.places, 3 * scene.particles)
     return scene.derived(q=q, p=p, m=m, terms=terms, places=places)
-
-
-def timed(scene: Any) -> tuple[Callable[[float, Floats, Floats], Floats], ...]:
-    """For a solver with its own time, as functions of (t, q, p): the force (n,) [M L/T2], and the derivatives
-    (2n, 2n) of (p/m, force) by (q, p)."""
-    system, n = scene.system, scene.n
-    if not system.is_driven:
-        return lambda t, q, p: system.force(q, p), lambda t, q, p: system.jacobian(q, p)
-    clocked = system.clocked.system
-    kept = np.append(np.arange(n), np.arange(n + 1, 2 * n + 1))
-
-    def force(t: float, q: Floats, p: Floats) -> Floats:
-        return np.asarray(clocked.force(np.append(q, t), np.append(p, CLOCK))[:n], np.float64)
-
-    return force, lambda t, q, p: clocked.jacobian(np.append(q, t), np.append(p, CLOCK))[np.ix_(kept, kept)]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from springcheck.physics.exact.powers import propagate, rotation
 from springcheck.schemes.catalogue import ATTACHED, SCHEMES, UNKNOWN, Scheme, number, solver
 from springcheck.schemes.kinds import KINDS
 from springcheck.schemes.law import Law, Trait
 from springcheck.schemes.linear import amplification, condition, invariant, matrix
 from springcheck.schemes.lookup import bring, known, meant, scheme, textbook, title
+from springcheck.schemes.powers import propagate, rotation
 from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from springcheck.physics.arrays import Extended, Integers, Reals
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.exact.normal import Modes
-from springcheck.physics.exact.powers import rotation
 from springcheck.physics.exact.response import drives, first_difference
 from springcheck.physics.system import System
 from springcheck.schemes.catalogue import Scheme
+from springcheck.schemes.powers import rotation
 from springcheck.schemes.stepping import step
 
 Complex = NDArray[np.complexfloating[Any, Any]]

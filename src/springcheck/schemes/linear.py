@@ -6,8 +6,8 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.exact.linear import flow
-from springcheck.physics.exact.powers import rotation
 from springcheck.schemes.catalogue import Scheme
+from springcheck.schemes.powers import rotation
 from springcheck.schemes.stepping import step
 
 

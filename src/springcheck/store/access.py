@@ -24,6 +24,8 @@ MOST_MEMBERS = 2_000
 """Members of a group: runs or tables of one file.  Ours have tens; every command slows down with them."""
 LONGEST_NAME = 200
 """Characters of a name."""
+LONGEST_DOCUMENT, LONGEST_ATTRIBUTE = 1 << 24, 1 << 22
+"""Bytes: parsed into Python objects they take some twenty times as much memory."""
 EXPANSION = 1100
 """Ratio of sizes beyond what deflate can reach (1032): an array that claims more is damaged."""
 CONTIGUOUS, CHUNKED, VIRTUAL = h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED, h5py.h5d.VIRTUAL
@@ -202,7 +204,9 @@ def text(file: Any, path: str) -> str:
 
 
 def json(text: str, kind: Any = Any) -> Any:
-    """Parse a text of a file as JSON. ValueError where it is not JSON."""
+    """Parse a text of a file as JSON. ValueError where it is not JSON, or too long."""
+    if len(text) > LONGEST_DOCUMENT:
+        raise ValueError(f"has {len(text)} characters, more than springcheck writes")
     try:
         return msgspec.json.decode(text.encode("utf-8", "surrogatepass"), type=kind)
     except (msgspec.MsgspecError, RecursionError) as error:
@@ -255,6 +259,8 @@ def _value(node: Any, name: bytes) -> Any:
     kind, memory = _TYPES[code]
     if memory is None:
         return f"<{kind}>"
+    if known.get_storage_size() > LONGEST_ATTRIBUTE:
+        raise refuse(node, f"has an attribute of more than {LONGEST_ATTRIBUTE >> 20} MiB")
     values = np.empty(known.shape, kind)
     known.read(values, memory)
     return [scalar(value) for value in values.ravel()] if known.shape else scalar(values[()])

@@ -115,17 +115,15 @@ def reserve(file: BinaryIO, size: int) -> None:
 
     libhdf5 cannot close a file whose last write failed; with the space reserved beforehand none fails.
     """
-    if hasattr(os, "posix_fallocate"):
-        try:
-            os.posix_fallocate(file.fileno(), 0, size)
-            return
-        except OSError as error:
-            if error.errno not in UNSUPPORTED:
-                raise
-    block = bytes(1 << 20)
-    for start in range(file.seek(0, os.SEEK_END), size, len(block)):
-        file.write(block[: size - start])
-    file.flush()
+    try:
+        os.posix_fallocate(file.fileno(), 0, size)
+    except (AttributeError, OSError) as error:
+        if isinstance(error, OSError) and error.errno not in UNSUPPORTED:
+            raise
+        block = bytes(1 << 20)
+        for start in range(file.seek(0, os.SEEK_END), size, len(block)):
+            file.write(block[: size - start])
+        file.flush()
 
 
 def temporary(path: Path) -> Path:
@@ -163,15 +161,16 @@ def put_bytes(content: bytes, path: Path) -> None:
 
 def sync_folder(folder: Path) -> None:
     """Make names in a folder survive a loss of power."""
-    if sys.platform != "win32":
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        except OSError as error:
-            if error.errno not in UNSUPPORTED:
-                raise
-        finally:
-            os.close(handle)
+    if sys.platform == "win32":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in UNSUPPORTED:
+            raise
+    finally:
+        os.close(handle)
 
 
 def is_plain(path: Path) -> bool:

@@ -71,7 +71,8 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         with files.told(parts, "write"):
             run = _claimed(path, parts, command, force=force)
     except BaseException:
-        _leave(parts, "lock")
+        if {entry.name for entry in parts.iterdir()} == {"lock"}:
+            _leave(parts)
         lock.release()
         raise
     return Journal(path, run, lock)
@@ -81,20 +82,20 @@ def _is_free(parts: Path) -> bool:
     """Whether a journal may be created here: the folder is missing, or holds no file of another name."""
     if not os.path.lexists(parts):
         return True
-    if parts.is_symlink() or not parts.is_dir():
-        return False
     with contextlib.suppress(StoreError):
         # without a claim a kill or a loss of power has left it at the very beginning or end
-        return claim(parts) is not None or all(map(_is_mine, parts.iterdir()))
+        mine = parts.is_dir() and not parts.is_symlink()
+        return mine and (claim(parts) is not None or all(map(_is_mine, parts.iterdir())))
     return False
 
 
 def _is_mine(entry: Path) -> bool:
     """Whether a file is recognisably one of a journal: an empty lock, a temporary file, or a store."""
+    if not files.is_plain(entry) or not _NAMES.fullmatch(entry.name):
+        return False
     if entry.name == "lock":
-        return files.is_plain(entry) and entry.stat().st_size == 0
-    known = _NAMES.fullmatch(entry.name) and files.is_plain(entry)
-    return bool(known) and (files.TEMPORARY.fullmatch(entry.name) is not None or _is_store(entry))
+        return entry.stat().st_size == 0
+    return files.TEMPORARY.fullmatch(entry.name) is not None or _is_store(entry)
 
 
 def _is_store(path: Path) -> bool:
@@ -109,8 +110,6 @@ def _claimed(path: Path, parts: Path, command: str, *, force: bool) -> str:
         # killed as it tidied up: the store is complete
         _remove(parts, "command")
         known = None
-    if known is None:
-        _remove(parts, *_WORK)
     if known is not None and (not force or known.forced):
         if known.command == command:
             _remove(parts, "springcheck", "collection")
@@ -121,14 +120,13 @@ def _claimed(path: Path, parts: Path, command: str, *, force: bool) -> str:
                 f"{parts} holds finished work of another command, or of other versions of what it runs: "
                 "give that command again to complete it, or --force to discard it"
             )
+    _remove(parts, *_WORK)
     if path.exists() and not force:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
-    _remove(parts, *_WORK)
-    run = os.urandom(16).hex()
-    claimed = Claim(run=run, command=command, forced=force)
+    claimed = Claim(run=os.urandom(16).hex(), command=command, forced=force)
     files.put_bytes(msgspec.json.encode(claimed), parts / "command")
     files.sync_folder(path.absolute().parent)
-    return run
+    return claimed.run
 
 
 def _run_of(path: Path) -> str:
@@ -147,13 +145,10 @@ def _look_at_parts(parts: Path, run: str) -> None:
         for part in there:
             apart.know(part)
     for part in there:
-        if not checking.check_file(part):
-            with opened(part) as file:
-                if access.attribute(file, "run") == run:
-                    continue
-        part.unlink()
-        why = f"{part} was damaged and is removed: {name_of(part)} is measured again"
-        warnings.warn(why, StoreWarning, stacklevel=5)
+        if checking.check_file(part) or _run_of(part) != run:
+            part.unlink()
+            why = f"{part} was damaged and is removed: {name_of(part)} is measured again"
+            warnings.warn(why, StoreWarning, stacklevel=5)
 
 
 def _remove(parts: Path, *beginnings: str) -> None:
@@ -163,14 +158,12 @@ def _remove(parts: Path, *beginnings: str) -> None:
             entry.unlink(missing_ok=True)
 
 
-def _leave(parts: Path, *empty: str) -> None:
-    """Remove a journal that holds no more than these files; its claim first."""
+def _leave(parts: Path) -> None:
+    """Remove a journal, its claim first; files that a user has put into it stay."""
     with contextlib.suppress(OSError):
-        if {entry.name for entry in parts.iterdir()} <= {*empty}:
-            _remove(parts, "command")
-            _remove(parts, *empty)
-            # files that a user has put into it stay
-            parts.rmdir()
+        _remove(parts, "command")
+        _remove(parts, "")
+        parts.rmdir()
 
 
 class Journal:
@@ -233,19 +226,15 @@ class Journal:
             apart.know(self.path)
             # the store is complete: the same command would refuse to overwrite it
             interrupts.announce(plain(f"interrupted; {self.path} is complete"))
-            # the claim first: what a kill leaves of the journal then is no store
-            _remove(self.folder, "command")
-            _remove(self.folder, "")
-            with contextlib.suppress(OSError):
-                # files that a user has put into it stay
-                self.folder.rmdir()
+            _leave(self.folder)
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
 
     def close(self) -> None:
         """Release the lock; what is finished stays for the next writer."""
-        _leave(self.folder, "lock", "command")
+        if self.folder.is_dir() and {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:
+            _leave(self.folder)
         self._lock.release()
 
     def __enter__(self) -> Journal:

@@ -97,8 +97,11 @@ def read_one(path: str | Path, label: str) -> Trajectory:
 def digest(path: str | Path, label: str) -> str:
     """The digest of the numbers of a trajectory as they are now (see `digests.combined`)."""
     with _held(path, label) as (_, arrays), open(arrays["time"].file.filename, "rb") as raw:
-        sizes = {name: (x.id.get_offset(), x.size * x.dtype.itemsize) for name, x in arrays.items()}
-        return digests.combined({name: digests.sha256(raw, *at) for name, at in sizes.items()}, arrays)
+        found = {
+            name: digests.sha256(raw, x.id.get_offset(), x.size * x.dtype.itemsize)
+            for name, x in arrays.items()
+        }
+        return digests.combined(found, arrays)
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
@@ -170,13 +173,12 @@ def summary(path: str | Path) -> Summary:
     for label, source in sources(path).items():
         with opened(source) as file:
             runs.append(run_and_arrays(file, label)[0])
+    found = Parts.of(path)
     root: dict[str, Scalar] = {}
     documents: tuple[str, ...] = ()
-    if path.is_file():
+    if found.complete:
         with opened(path) as file:
-            root = access.attributes(file)
-            documents = tuple(access.children(file, "documents"))
-    found = Parts.of(path)
+            root, documents = access.attributes(file), tuple(access.children(file, "documents"))
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),

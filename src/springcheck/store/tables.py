@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields
@@ -35,9 +36,8 @@ _OWN = tuple(name for name in _VERDICT if not name.startswith("sees_"))
 class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
-    Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one), `auxiliary` those next to the signal, `log` those of signal and axes
-    that want a logarithmic scale.
+    They hold numbers, booleans or text; `units` has the unit of a column.  A viewer draws the column
+    `signal` over `axes` ("." for an index), with the columns `auxiliary`; those in `log` logarithmically.
     """
 
     name: str
@@ -56,23 +56,17 @@ def write(file: Any, table: Table) -> None:
     if not all(parts) or {".", ".."} & set(parts):
         raise ValueError(f"{table.name!r} cannot name a table")
     group = file.create_group(table.name)
-    write_attributes(group, {"kind": "table", **table.attributes})
+    known: dict[str, Any] = {"kind": "table", **table.attributes}
     if table.signal:
-        write_attributes(group, {"NX_class": "NXdata", "signal": table.signal})
-        if table.axes:
-            write_attributes(group, {"axes": list(table.axes)})
-        if table.auxiliary:
-            write_attributes(group, {"auxiliary_signals": list(table.auxiliary)})
-        if table.log:
-            scale = {name: "log" if name in table.log else "linear" for name in (*table.axes, table.signal)}
-            axes = [scale[name] for name in table.axes]
-            # the plural is silx's, the singular H5Web's
-            style = {
-                "axes_scale_types": axes,
-                "axes_scale_type": axes,
-                "signal_scale_type": scale[table.signal],
-            }
-            write_attributes(group, {_STYLE: json.dumps(style)})
+        known |= {"NX_class": "NXdata", "signal": table.signal}
+        known |= {"axes": list(table.axes)} if table.axes else {}
+        known |= {"auxiliary_signals": list(table.auxiliary)} if table.auxiliary else {}
+    if table.signal and table.log:
+        *axes, signal = ("log" if name in table.log else "linear" for name in (*table.axes, table.signal))
+        # the plural is silx's, the singular H5Web's
+        style = {"axes_scale_types": axes, "axes_scale_type": axes, "signal_scale_type": signal}
+        known[_STYLE] = json.dumps(style)
+    write_attributes(group, known)
     for name, given in table.columns.items():
         values = np.asarray(given)
         is_text = values.dtype.kind in "UO"
@@ -87,15 +81,13 @@ def read(group: Any, name: str) -> Table:
     """A table as it was written.  StoreError where it is none."""
     known = access.attributes(group)
     left = {"kind", "NX_class", "signal", "axes", "auxiliary_signals", _STYLE, "sha256"}
-    signal = str(known.get("signal", ""))
-    axes = tuple(map(str, _listed(known.get("axes"))))
-    try:
+    signal, axes = str(known.get("signal", "")), _listed(known.get("axes"))
+    style: dict[str, Any] = {}
+    with contextlib.suppress(ValueError):
         style = access.json(str(known.get(_STYLE, "{}")), dict[str, Any])
-    except ValueError:
-        style = {}
     scales = [*_listed(style.get("axes_scale_types")), style.get("signal_scale_type")]
     columns = {column: access.dataset_at(group, column) for column in access.members(group)}
-    units = {column: access.attributes(dataset).get("unit") for column, dataset in columns.items()}
+    units = {column: access.attribute(dataset, "unit") for column, dataset in columns.items()}
     return Table(
         name=name,
         columns={column: access.column(dataset) for column, dataset in columns.items()},
@@ -103,13 +95,13 @@ def read(group: Any, name: str) -> Table:
         attributes={key: value for key, value in known.items() if key not in left},
         signal=signal,
         axes=axes,
-        auxiliary=tuple(map(str, _listed(known.get("auxiliary_signals")))),
+        auxiliary=_listed(known.get("auxiliary_signals")),
         log=tuple(column for column, scale in zip((*axes, signal), scales, strict=False) if scale == "log"),
     )
 
 
-def _listed(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else []
+def _listed(value: Any) -> tuple[str, ...]:
+    return tuple(map(str, value)) if isinstance(value, list) else ()
 
 
 def names(file: Any) -> Iterator[str]:
@@ -129,21 +121,19 @@ def _is_table(node: Any) -> bool:
 
 def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
     """Verdicts as a table; passed is 1, 0, or -1 where the check does not apply."""
-    rows = [
-        (*(_PASSED[v.passed] if name == "passed" else getattr(v, name) for name in _OWN), *astuple(v.sees))
-        for v in verdicts
-    ]
+    # an unknown limit, None, becomes NaN
+    rows = [[*(getattr(v, name) for name in _OWN), *astuple(v.sees)] for v in verdicts]
+    passed = [_PASSED[v.passed] for v in verdicts]
     types = {"O": object, "f": np.float64, "i": np.int8}
-    columns = zip(_VERDICT.items(), zip(*rows, strict=True), strict=True)
-    return Table(
-        name="verdicts",
-        # an unknown limit, None, becomes NaN
-        columns={name: np.array(values, dtype=types[kind]) for (name, kind), values in columns},
-        attributes={
-            "about": "passed: 1 yes, 0 no, -1 the check does not apply; sees_...: the relative change of the "
-            "parameter from which on the check fails, NaN where it says nothing of it"
-        },
+    columns = {
+        name: np.array(passed if name == "passed" else values, dtype=types[kind])
+        for (name, kind), values in zip(_VERDICT.items(), zip(*rows, strict=True), strict=True)
+    }
+    about = (
+        "passed: 1 yes, 0 no, -1 the check does not apply; sees_...: the relative change of the "
+        "parameter from which on the check fails, NaN where it says nothing of it"
     )
+    return Table(name="verdicts", columns=columns, attributes={"about": about})
 
 
 def to_verdicts(table: Table) -> tuple[Verdict, ...]:

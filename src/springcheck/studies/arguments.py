@@ -26,8 +26,8 @@ def repeatable(name: str, metavar: str, about: str, **more: Any) -> Argument:
 
 
 JSON = argument("--json", action="store_true", help="one JSON document on standard output")
-QUIET = argument("--quiet", action="store_true", help="print nothing but mistakes")
-FORCE = argument("--force", action="store_true", help="write an existing store anew")
+QUIET = argument("--quiet", action="store_true", help="print errors only")
+FORCE = argument("--force", action="store_true", help="overwrite an existing store")
 ENGINE = repeatable("--engine", "FILE.py", "an engine of your own, for this call")
 SCENE = argument("scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file")
 """Arguments of many commands."""
@@ -50,7 +50,7 @@ def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
         repeatable(
             "--scheme", "SCHEME|NAME=SCHEME", "the scheme of your functions and programs, or of one of them"
         ),
-        argument("--timeout", type=float, metavar="SECONDS", help="that a program may take (default 600)"),
+        argument("--timeout", type=float, metavar="SECONDS", help="time limit for a program (default 600)"),
         FORCE,
         JSON,
         QUIET,

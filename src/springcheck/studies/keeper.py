@@ -20,6 +20,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.store import Draft, Solution, Table
+from springcheck.studies import references
 from springcheck.studies import team as teams
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut
@@ -209,9 +210,23 @@ def restored(name: str, path: Path, kinds: Mapping[str, type]) -> Studied:
     return found
 
 
+REFERENCE = "reference"
+"""Name of the table with the reference solution of a store's scene."""
+
+
+def reference_of(scene: Scene) -> list[store.Table]:
+    """The reference solution of a scene as a table, none where it was not integrated."""
+    digest, columns = references.columns(scene)
+    about = "see springcheck.studies.references: Legendre series of the momenta, extended numbers as two"
+    attributes = {"digest": digest, "about": about}
+    return [store.Table(name=REFERENCE, columns=columns, attributes=attributes)] if columns else []
+
+
 def stored_scene(path: Path) -> Scene:
-    """The scene of a store, parsed from its saved text."""
+    """The scene of a store, parsed from its saved text; its reference is taken from there as well."""
     name = str(store.summary(path).root.get("scene_name", path.stem))
+    if known := store.tables_of(path).get(REFERENCE):
+        references.take(str(known.attributes.get("digest")), known.columns)
     return scenefile.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
 
 

@@ -63,6 +63,8 @@ class TextTable:
     """Rows; a row that is a Text is a heading over all columns."""
     left: frozenset[str]
     prose: str
+    drop: tuple[str, ...] = ()
+    """Columns that are left out, the first one first, where all do not fit beside each other."""
 
     def lines(self, wide: int) -> Iterator[Text]:
         """Its lines on a terminal of so many columns."""
@@ -75,7 +77,11 @@ class TextTable:
             j = self.titles.index(self.prose)
             words = [len(word) for row in cells if j < len(row) for word in str(row[j]).split()]
             widths[j] = min(widths[j], max(self._free(widths, j, wide), *words, 1))
-        for i, block in enumerate(_blocks(widths, wide)):
+        kept = list(range(len(widths)))
+        for title in self.drop:
+            if sum(widths[j] for j in kept) + COLUMN_GAP * (len(kept) - 1) > wide:
+                kept.remove(self.titles.index(title))
+        for i, block in enumerate(_blocks(widths, kept, wide)):
             if i:
                 yield plain()
             for row in (head, *self.rows):
@@ -109,10 +115,10 @@ class TextTable:
             yield Text(tuple(out), whole=True)
 
 
-def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
+def _blocks(widths: Sequence[int], kept: Sequence[int], width: int) -> list[list[int]]:
     """Blocks of columns that fit the width, the first one in each block."""
     blocks, used = [[0]], widths[0]
-    for j in range(1, len(widths)):
+    for j in kept[1:]:
         if used + COLUMN_GAP + widths[j] > width and len(blocks[-1]) > 1:
             blocks.append([0])
             used = widths[0]
@@ -122,10 +128,11 @@ def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
 
 
 def table(
-    titles: Sequence[str], rows: Iterable[Row], *, left: Collection[str] = ("method",), prose: str = ""
-) -> TextTable:
+    titles: Sequence[str], rows: Iterable[Row], *, left: Collection[str] = ("method",), prose: str = "",
+    drop: Sequence[str] = (),
+) -> TextTable:  # fmt: skip
     """A table; the columns `left` are left-aligned, numbers right-aligned."""
-    return TextTable(tuple(titles), tuple(rows), frozenset(left), prose)
+    return TextTable(tuple(titles), tuple(rows), frozenset(left), prose, tuple(drop))
 
 
 Lines = list[Text | TextTable]

@@ -37,9 +37,10 @@ from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.engines.openmm.rounding import CUSTOM, arithmetic, sizes
 from springcheck.engines.openmm.thermostats import thermostat
+from springcheck.engines.solvers import timed
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import Drive, timed
+from springcheck.physics.driven import Drive
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Distances, Morse, RadialSpring, WallSpring
 

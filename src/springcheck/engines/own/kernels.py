@@ -58,7 +58,6 @@ def many(
     room: Rows,
     q: Numbers,
     p: Numbers,
-    skip: int,
     qs: Rows,
     ps: Rows,
 ) -> None:
@@ -69,8 +68,6 @@ def many(
 
     Of a tableau the rows of `a` are coefficients times the step, the weights last, v and f (s, n) velocities
     and forces of the stages (q + sum a v, p + sum a f), and `stage` is the one that is being formed.
-
-    Rows of the result leave out the first `skip` particles.
     """
     code, slot, x, y, damped, decay, a = steps
     v, f, stage, t, stale = room
@@ -151,8 +148,8 @@ def many(
                     add(a[stages][s], f[s], p)
         out_q, out_p = qs[row], ps[row]
         for i in range(len(out_q)):
-            out_q[i] = q[skip + i]
-            out_p[i] = p[skip + i]
+            out_q[i] = q[i]
+            out_p[i] = p[i]
 
 
 def single(

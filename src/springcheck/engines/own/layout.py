@@ -96,20 +96,3 @@ def _chain(a: Integers, b: Integers, k: Floats, rest: Floats, n: int) -> tuple[F
     order = np.argsort(low)
     # the same spring seen from its other end: its rest length changes sign, exactly
     return k[order], np.where(a < b, rest, -rest)[order]
-
-
-def cut(slot: Slot, lo: int, hi: int) -> Slot:
-    """The particles lo to hi of a row, without what joins them to others."""
-    indices, terms, (k_held, at_held), (k, rest, ends), (c, m) = slot
-    mine = ends.copy()
-    if lo > 0:
-        mine[:2] = 0.0
-    if len(k) and hi < len(k) + 1:
-        mine[2:] = 0.0
-    return (
-        indices,
-        terms,
-        (k_held[lo:hi], at_held[lo:hi]),
-        (k[lo : hi - 1], rest[lo : hi - 1], mine),
-        (c[lo:hi], m[lo:hi]),
-    )

@@ -2,7 +2,6 @@
 
 numba is imported only for a run that is worth it (see `WORTH`).  The numbers are the same either way,
 to the last bit, so a machine without numba, or with a cache folder that cannot be written, gets them too.
-They do not depend on how the particles are cut into tiles, nor on the number of threads.
 
 A scene with a term that the loops do not have is carried through the same steps by NumPy.  In a long run the
 loops do it, with the term's own slope compiled (`laws`); an exponential may then differ by a rounding.
@@ -19,7 +18,8 @@ import numpy as np
 import springcheck
 from springcheck import schemes
 from springcheck.engines.contract import Label, Method
-from springcheck.engines.own import kernels, laws, layout, loops, solver, tiles, vectors
+from springcheck.engines.own import kernels, laws, layout, loops, solver, vectors
+from springcheck.engines.own.job import Job, with_room
 from springcheck.engines.own.operations import NoKernelError, Program, evaluations, program, terms_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -42,12 +42,7 @@ class Own:
     """
 
     def __init__(
-        self,
-        how: tiles.Whole | tiles.Tiled | vectors.Vectors,
-        calls: tuple[int, int],
-        *,
-        compiled: bool,
-        note: str = "",
+        self, how: Job | vectors.Vectors, calls: tuple[int, int], *, compiled: bool, note: str = ""
     ) -> None:
         self.compiled, self.note = compiled, note
         self._first, self._each = calls
@@ -90,12 +85,10 @@ def prepare(
     step: float,
     *,
     compiled: bool | None = None,
-    threads: int | None = None,
 ) -> Own:
     """Like `start`, by any scheme; `compiled` forces the kernel either way, by default the length decides.
 
-    Forced, a missing numba is an ImportError; otherwise the interpreted kernel serves, or NumPy.  At most
-    `threads` threads are used, by default as many as there are processors.
+    Forced, a missing numba is an ImportError; otherwise the interpreted kernel serves, or NumPy.
     """
     found = schemes.scheme(scheme) if isinstance(scheme, str) else scheme
     calls = evaluations(found, scene)
@@ -115,18 +108,14 @@ def prepare(
         if plan is None or apart:
             return Own(vectors.Vectors(found, scene, step), calls, compiled=False, note=note)
         scene = scene.system.clocked
-        job = _one(plan, scene) or _many(plan, scene, max(calls))
-    ahead = job.work * scene.steps >= WORTH if compiled is None else compiled
-    if ahead:
+        job = _one(plan, scene) or _many(plan, scene)
+    if compiled or (compiled is None and job.work * scene.steps >= WORTH):
         try:
-            job = tiles.compiled(job)
+            return Own(job.compiled, calls, compiled=True)
         except ImportError:
             if compiled:
                 raise
-            ahead = False
-    tiled = ahead and job.reach > 0
-    how = tiles.Tiled(job, threads or tiles.processors()) if tiled else tiles.Whole(job, compiled=ahead)
-    return Own(how, calls, compiled=ahead)
+    return Own(job.interpreted, calls, compiled=False)
 
 
 def _lacks(plan: Program, scene: Scene) -> bool:
@@ -139,7 +128,7 @@ def _lacks(plan: Program, scene: Scene) -> bool:
     return scene.system.is_driven and beside
 
 
-def _one(plan: Program, scene: Scene) -> tiles.Job | None:
+def _one(plan: Program, scene: Scene) -> Job | None:
     """One particle on one spring at rest in 0."""
     walls = [term for term in scene.terms if isinstance(term, WallSpring)]
     if scene.n > 1 or len(walls) != 1 or len(scene.terms) != 1 or len(walls[0]) != 1 or walls[0].at[0] != 0:
@@ -152,34 +141,21 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
     code, _, x, y = plan.arrays
     v, f = np.zeros((2, plan.a.shape[1]))
     head = (code, x, y, plan.a, v, f), (divisor, m, k)
-    return tiles.Job(kernel=kernels.single, head=head, state=state, n=1, work=plan.stages)
+    return Job(kernel=kernels.single, arguments=(*head, *state), n=1, work=plan.stages)
 
 
-def _many(plan: Program, scene: Scene, calls: int) -> tiles.Job:
-    """Any terms: as a row where they allow it, as index lists otherwise; `calls` forces in a step."""
+def _many(plan: Program, scene: Scene) -> Job:
+    """Any terms: as a row where they allow it, as index lists otherwise."""
     n = scene.n
     terms = [terms_of(name, scene) for name in plan.forces]
     slots = layout.slots(terms, scene.m)
     work = float(sum(n + sum(len(term) for term in some) for some in terms))
-    joined = any(len(k) for *_, (k, _, _), _ in slots)
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
-    reach = 0 if slots[0][0] else calls
-    solved = solver.NONE
-    if plan.implicit_step:
-        solved = solver.factors(scene, plan.implicit_step)
-        reach = 0 if joined else reach
+    solved = solver.factors(scene, plan.implicit_step) if plan.implicit_step else solver.NONE
     rates = scene.system.friction_rates.astype(np.float64)
     # without friction a force stays as the clock is set, which moves it by a rounding alone
     damped = np.array(plan.damped) | (scene.system.is_driven and scene.system.is_damped)
     decays = np.array([np.exp(-x * rates) for x in plan.decays] or np.empty((0, n)))
-    return tiles.Job(
-        kernel=kernels.many,
-        head=((*plan.arrays, damped, decays, plan.a), *(slots * 2)[:2], solved),
-        m=m,
-        state=(q, p),
-        stages=plan.a.shape[1],
-        n=n,
-        work=work * plan.stages,
-        joined=joined,
-        reach=reach,
-    )
+    head = (*plan.arrays, damped, decays, plan.a), *(slots * 2)[:2], solved
+    arguments = with_room(head, m, q, p, plan.a.shape[1])
+    return Job(kernel=kernels.many, arguments=arguments, n=n, work=work * plan.stages)

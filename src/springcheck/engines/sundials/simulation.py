@@ -26,9 +26,9 @@ from sksundae.ida import IDA
 
 from springcheck.engines import quiet, solvers
 from springcheck.engines.contract import Label, Method, Simulation, Stopped
+from springcheck.engines.solvers import timed
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Reals
-from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
@@ -228,4 +228,4 @@ class Solver:
             rows = np.array(states)
             q[: len(rows)], p[: len(rows)] = rows[:, :n], rows[:, n : 2 * n]
         if failure:
-            raise Stopped(len(states), " ".join([failure, *said]).strip())
+            raise Stopped(len(states), " ".join(" ".join([failure, *said]).split()))

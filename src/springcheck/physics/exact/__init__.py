@@ -73,7 +73,7 @@ def uncertainty(scene: Scene, duration: float) -> float:
     with np.errstate(all="ignore"):
         # the errors of all particles together are smaller than the sum of their bounds; a chain has a joint
         # bound
-        modes = LinearMotion.of(system)
+        modes = LinearMotion(system) if system.has_modes else None
         square = modes.energy_of_doubt(np.longdouble(duration)) if modes else None
         if square is None:
             dq, dp = known.doubt(duration)

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, by_identity
-from springcheck.physics.exact.closedform import ClosedForm, States
+from springcheck.physics.arrays import EPS, Extended, States, by_identity
 from springcheck.physics.exact.normal import Modes, discriminant, split
 
 SMALLEST = np.finfo(np.longdouble).tiny
@@ -17,23 +16,26 @@ ROUNDINGS = 32
 """Rounding errors of a motion in extended precision, for each of its summands and for its phase."""
 
 
-class LinearMotion(ClosedForm):
+class LinearMotion:
     """A whole system that has normal modes."""
 
     def __init__(self, system: Any) -> None:
-        super().__init__(system)
-        self.need(system.has_modes)
+        self.system = system
         self.modes: Modes = system.modes
 
     def at(self, t: Extended) -> States:
+        """q and p (f, n) at times t (f, 1) [T]."""
         found, start = self.modes, self.modes.start
         law = _Law(found.w2, found.rate, found.pull, start.slow, start.fast)
         return found.from_centres(*_moved(start.u, start.v, t, law))
 
     def doubt(self, t: np.longdouble) -> States:
-        """A mode is known to a few roundings of its amplitude, of its phase, and of the summands of its
-        start.  Errors of the equations themselves, y'' = -A y - r y' + g, act as forces, and a force f moves
-        y by at most |t f| min(t, 1/w) (variation of constants)."""
+        """See `solution.Motion`.
+
+        A mode is known to a few roundings of its amplitude, of its phase, and of the summands of its start.
+        Errors of the equations themselves, y'' = -A y - r y' + g, act as forces, and a force f moves y by at
+        most |t f| min(t, 1/w) (variation of constants).
+        """
         found = self.modes
         y, v, of_y, of_v = self._of_modes(t)
         y, v = found.spread(y) + of_y, found.spread(v) + of_v

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, WIDE, Extended, Integers, Reals, by_identity
-from springcheck.physics.exact.closedform import PI
 from springcheck.physics.exact.digits import FEWER_DIGITS, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
+
+PI = 4 * np.arctan(np.longdouble(1))
 
 CENTRE_ROUNDINGS = 16
 """Roundings of a centre's distance in the closed form of a motion about it; 6 have been met."""

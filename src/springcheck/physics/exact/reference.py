@@ -15,14 +15,13 @@ difference so far, plus the roundings of constants, which all share.
 from __future__ import annotations
 
 import contextlib
-from functools import cache
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, Floats, by_identity
-from springcheck.physics.exact.closedform import ClosedForm, States, wide
-from springcheck.physics.exact.digits import digits, exactly, extended
+from springcheck.physics.arrays import EPS, Extended, Floats, States, wide
+from springcheck.physics.exact.collocation import integrals, legendre, onward, rule
 from springcheck.physics.system import System
 
 STAGES, FEWER_STAGES = 20, 16
@@ -35,7 +34,7 @@ KICK = 2 * EPS
 """Relative size of the roundings that these get at every step."""
 FELT = 1.5
 """The stated error in units of the largest difference."""
-FELT_ROUNDING = 4 * EPS
+FELT_ROUNDING = 3 * EPS
 """The least stated error, relative to the largest size so far and to the time: roundings of the constants of
 a force are the same in all integrations."""
 MOST_ERROR = 1e-3
@@ -63,78 +62,10 @@ PLACES = 8
 """Points of each step at which integrations are compared."""
 BLOCK = 256
 """Steps that are compared at a time."""
-RULE_DIGITS = 50
 
 
 class NoReferenceError(ValueError):
     """A motion that cannot be integrated here; the message says why."""
-
-
-@by_identity
-class Rule(NamedTuple):
-    """Nodes c (s,) on [0, 1]; A and A A (s, s), their last rows as a sum of two numbers (2, s); and the
-    matrix from values at the nodes to Legendre coefficients (s, s)."""
-
-    c: Extended
-    a: Extended
-    aa: Extended
-    end: Extended
-    end_twice: Extended
-    series: Extended
-
-
-def _legendre(x: Any, count: int) -> Any:
-    """P_0 to P_(count - 1) at x (r,) -> (r, count), in the arithmetic of x."""
-    found = [x * 0 + 1, x]
-    for j in range(1, count - 1):
-        found.append(((2 * j + 1) * x * found[j] - j * found[j - 1]) / (j + 1))
-    return np.stack(found[:count], axis=-1)
-
-
-def _integrals(x: Any, count: int) -> Any:
-    """Their integrals from -1 to x, halved for a step of length 1 (r, count)."""
-    p = _legendre(x, count + 1)
-    each = [(p[:, j + 1] - p[:, j - 1]) / (2 * (2 * j + 1)) for j in range(1, count)]
-    return np.stack([(x + 1) / 2, *each], axis=-1)
-
-
-def _parts(x: Any) -> Extended:
-    """Decimal numbers as a sum of two extended ones (2, ...)."""
-    high = extended(x)
-    return np.stack([high, extended(x - exactly(high))])
-
-
-@cache
-def rule(s: int) -> Rule:
-    """Radau IIA with s stages, computed in decimals."""
-    with digits(RULE_DIGITS):
-        # all nodes but the last are zeros of a Jacobi polynomial: eigenvalues of a symmetric matrix
-        k = np.arange(s - 1)
-        jacobi = np.diag(-1 / ((2 * k + 1) * (2 * k + 3)))
-        jacobi += np.diag((np.sqrt(k * (k + 1)) / (2 * k + 1))[1:], -1)
-        x = exactly(np.append(np.linalg.eigvalsh(jacobi), 1.0))
-        for _ in range(3):
-            y = x[:-1]
-            p = _legendre(y, s + 1)
-            # (x**2 - 1) P_n' = n (x P_n - P_(n-1))
-            one, other = (n * (y * p[:, n] - p[:, n - 1]) / (y * y - 1) for n in (s, s - 1))
-            x[:-1] = y - (p[:, s] - p[:, s - 1]) / (one - other)
-        p = _legendre(x, s)
-        series = exactly(np.linalg.inv(p.astype(np.float64)))
-        for _ in range(3):
-            series = series @ (2 * exactly(np.eye(s)) - p @ series)
-        a = _integrals(x, s) @ series
-        twice = a @ a
-        return Rule(
-            extended((1 + x) / 2), extended(a), extended(twice), _parts(a[-1]), _parts(twice[-1]),
-            extended(series),
-        )  # fmt: skip
-
-
-@cache
-def _onward(s: int, powers: int) -> Extended:
-    """Matrix (s, s) from the series of a step to values at the nodes of the next, 2**powers as long."""
-    return wide(_legendre(1 + 2 * rule(s).c * np.longdouble(2.0) ** powers, s))
 
 
 def _added(total: Extended, rest: Extended, change: Extended) -> tuple[Extended, Extended]:
@@ -174,7 +105,7 @@ class Path:
     def _guess(self, power: int) -> Extended:
         """Momenta at the nodes of the next step."""
         if self.powers and power <= self.powers[-1] + 1:
-            return _onward(self.stages, power - self.powers[-1]) @ self.series[-1]
+            return onward(self.stages, power - self.powers[-1]) @ self.series[-1]
         return np.tile(self.p, (self.stages, 1))
 
     def _noise(self, h: Any, q: Extended, p: Extended) -> Extended:
@@ -239,7 +170,7 @@ class Path:
             expected = self.calls * float(end) / done
             if self.calls > (TRIAL_CALLS if expected > UNEVEN * limit else limit):
                 raise NoReferenceError(
-                    f"it needs about {expected:.1g} calls of the force, and at most {limit} are made"
+                    f"it needs about {expected:.1g} force evaluations; the limit is {limit}"
                 )
             self._step()
 
@@ -279,23 +210,26 @@ class Path:
         x = 2 * (times - np.array(self.done)[j]) / length - 1
         x = np.where((x >= -1) & (x <= 1), x, np.nan)
         series, h = np.stack(self.series)[j], (self.unit * length)[:, None]
-        q = np.einsum("fs,fsn->fn", _integrals(x, self.stages), series)
-        p = np.einsum("fs,fsn->fn", _legendre(x, self.stages), series)
+        q = np.einsum("fs,fsn->fn", integrals(x, self.stages), series)
+        p = np.einsum("fs,fsn->fn", legendre(x, self.stages), series)
         return np.stack(self.starts)[j] + h * q / self.m, p
 
 
-class ReferenceMotion(ClosedForm):
+class ReferenceMotion:
     """The motion of a whole system by integration, with its stated error.
 
     Raises NoReferenceError where the motion of its scene needs too many calls, or is singular.
     """
 
-    def __init__(self, system: System[Any]) -> None:
-        self.n = system.n
-        super().__init__(system.beside(system.clocked))
+    def __init__(self, system: System[Any], fill: Callable[[Any], None] | None = None) -> None:
+        """`fill` reads paths and errors, in place of an integration."""
+        self.n, self.digest = system.n, system.scene.digest
+        self.system = system.beside(system.clocked)
         self.paths: dict[int, tuple[Path, ...]] = {}
         self.known: dict[int, tuple[Extended, Extended, Extended]] = {}
         """By direction in time: ends of steps (j,), and the largest errors of q and p up to these (j, n)."""
+        if fill is not None:
+            fill(self)
         self._reach(1, np.longdouble(system.scene.steps))
         _, *errors = self.known[1]
         most, amplitude = self.paths[1][0].most, REST * wide(system.amplitudes[1])
@@ -312,7 +246,10 @@ class ReferenceMotion(ClosedForm):
 
     @np.errstate(all="ignore")
     def _reach(self, sign: int, end: Any) -> None:
-        """Integrate up to a time in steps, at two tolerances, and compare."""
+        """Integrate up to a time in steps, three times, and compare."""
+        if len(self.paths.get(sign, ())) == 1 and self.known[sign][0][-1] < end:
+            # read, and too short
+            del self.paths[sign], self.known[sign]
         if sign not in self.paths:
             unit = sign * self.system.scene.step
             again = (Path(self.system, unit, FEWER_STAGES, seed, self.n) for seed in SEEDS)
@@ -339,7 +276,7 @@ class ReferenceMotion(ClosedForm):
         self.known[sign] = done, dq, dp
 
     def at(self, t: Extended) -> States:
-        """NaN at times that are not reached."""
+        """See `solution.Motion`; NaN at times that are not reached."""
         times = t[:, 0] / np.longdouble(self.system.scene.step)
         q, p = np.full((2, len(t), self.n), np.nan, np.longdouble)
         for sign, mine in ((1, times >= 0), (-1, times < 0)):
@@ -374,6 +311,8 @@ class ReferenceMotion(ClosedForm):
 MOST_STORED = 32
 _STORED: dict[str, ReferenceMotion | str] = {}
 """The latest references, or why there is none, by the digests of their scenes."""
+FILLED: dict[str, Callable[[ReferenceMotion], None]] = {}
+"""What reads a reference from a file, by the digest of its scene (see `springcheck.studies.references`)."""
 
 
 def reference(system: System[Any]) -> ReferenceMotion:
@@ -382,7 +321,9 @@ def reference(system: System[Any]) -> ReferenceMotion:
     found = _STORED.pop(key, None)
     if found is None:
         try:
-            found = ReferenceMotion(system)
+            with contextlib.suppress(ValueError, KeyError, IndexError):
+                found = ReferenceMotion(system, FILLED[key])
+            found = found or ReferenceMotion(system)
         except NoReferenceError as error:
             found = str(error)
     _STORED[key] = found

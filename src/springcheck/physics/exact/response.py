@@ -13,8 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import EPS, Extended
-from springcheck.physics.exact.closedform import ClosedForm, States
+from springcheck.physics.arrays import EPS, Extended, States
 from springcheck.physics.exact.linear import ROUNDINGS, LinearMotion, reaches
 from springcheck.physics.exact.normal import Modes, discriminant
 from springcheck.physics.system import System
@@ -24,16 +23,14 @@ _Complex = NDArray[np.complexfloating[Any, Any]]
 SERIES_TERMS = 26
 """Terms of a series within |x t| < 1: the next one is below a rounding of 113 bits."""
 
-
 _Drive: TypeAlias = tuple[np.longdouble, np.longdouble, Extended]
 
 
-class Response(ClosedForm):
+class Response:
     """A whole scene of linear springs, friction that admits modes, and drives: the undriven motion `alone`,
     and the frequency, phase and force on each mode of every drive."""
 
     def __init__(self, system: System[Any]) -> None:
-        super().__init__(system)
         self.alone = LinearMotion(system.without("drive"))
         self.modes = self.alone.modes
         self.drives = drives(system, self.modes)

@@ -8,16 +8,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.closedform import ClosedForm
+from springcheck.physics.arrays import Extended, Integers, States
 from springcheck.physics.exact.linear import LinearMotion
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.graph import lowest_joined
 from springcheck.physics.system import Fields, System
+
+
+class Motion(Protocol):
+    """The motion of a whole system, its constants computed once."""
+
+    def at(self, t: Extended) -> States:
+        """q and p (f, n) at times t (f, 1) [T]."""
+        ...
+
+    def doubt(self, t: np.longdouble) -> States:
+        """Bounds (n,) on the errors of q [L] and p [M L/T] from the start to a time [T], or back to it."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,7 +36,7 @@ class Solution:
     """The motion of n particles, in independent groups (s,)."""
 
     n: int
-    groups: tuple[tuple[Integers, ClosedForm], ...]
+    groups: tuple[tuple[Integers, Motion], ...]
 
     def at(self, t: Extended) -> tuple[Extended, Extended]:
         """q and p (f, n) at times t (f, 1) [T]."""
@@ -70,7 +81,7 @@ class SolvedSystem(System[Fields]):
             return "a bath moves it at random"
         from springcheck.physics.exact.reference import NoReferenceError, reference
 
-        groups: list[tuple[Integers, ClosedForm]] = []
+        groups: list[tuple[Integers, Motion]] = []
         with np.errstate(all="ignore"):
             left = np.ones(self.n, dtype=bool)
             for chosen in _linear(self):
@@ -99,9 +110,9 @@ def _linear(system: System[Any]) -> list[Integers]:
     return [chosen] if len(chosen) else []
 
 
-def _closed_form(system: System[Any]) -> ClosedForm | None:
-    if not system.is_driven:
-        return LinearMotion.of(system)
-    from springcheck.physics.exact.response import Response
+def _closed_form(system: System[Any]) -> Motion | None:
+    if system.is_driven and system.without("drive").has_modes:
+        from springcheck.physics.exact.response import Response
 
-    return Response.of(system)
+        return Response(system)
+    return LinearMotion(system) if system.has_modes else None

@@ -8,7 +8,7 @@ from springcheck.studies.study import Study
 
 STUDY = Study(
     name="extremes",
-    about="the atlas of extreme cases",
+    about="find where engines fail at extreme steps, masses and amplitudes",
     arguments=(
         *team.arguments(),
         *store_arguments("extremes.h5"),

@@ -74,8 +74,8 @@ def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> At
 
 
 def on_platform(label: Label) -> bool:
-    """Whether a run of a method takes a context of a platform other than the reference."""
-    return label.platform not in ("", "Reference")
+    """Whether a run of a method takes a context of a platform that compiles its code."""
+    return label.platform not in ("", "Reference", "CPU")
 
 
 def absence(label: Label) -> str | None:

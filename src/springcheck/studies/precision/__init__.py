@@ -10,14 +10,14 @@ METRICS = ("largest", "end", "energy", "phase")
 
 STUDY = Study(
     name="precision",
-    about="error against run time and force calls, down to rounding",
+    about="measure error against run time and force calls",
     arguments=(
         SCENE,
-        argument("--metric", choices=METRICS, default=METRICS[0], help="which error (default: largest)"),
-        argument("--budget", type=float, metavar="SECONDS", help="of run time, shared fairly (default 45)"),
+        argument("--metric", choices=METRICS, default=METRICS[0], help="error to measure (default: largest)"),
+        argument("--budget", type=float, metavar="SECONDS", help="time shared by the methods (default 45)"),
         argument(
             "--long", type=float, metavar="PERIODS",
-            help="error over so many periods at one step, as 1e6, instead of error against run time",
+            help="measure the error over this many periods (1e6) at one step instead",
         ),
         argument("--step", type=float, metavar="H", help="the step of --long (default: the scene's)"),
         *store_arguments("SCENE-precision.h5"),

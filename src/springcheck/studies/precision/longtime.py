@@ -23,7 +23,7 @@ from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SceneError
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of
-from springcheck.figures.naming import labelled
+from springcheck.figures.naming import at_their_ends
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
@@ -233,9 +233,9 @@ class LongTime(Studied):
         if crossings:
             a, b, steps = crossings[0]
             heading = f"{a.method} falls behind {b.method} after {steps:,.0f} steps"
-            rules = [Rule(axis="x", at=steps * per, name=f"{steps * per:,.0f} periods")]
+            rules = [Rule(axis="x", at=steps * per, name=f"{steps * per:,.0f} periods", look="here")]
         shown = max(1e-16, 10.0 ** math.floor(math.log10(least))), min(MOST_SHOWN, 2 * most)
-        chart = labelled(Chart(
+        chart = at_their_ends(Chart(
             title="Errors over long times: lines in theory, marks as measured.",
             x=Scale(name="periods", log=True),
             y=Scale(name=f"{self.metric} error", log=True, shown=shown), curves=curves, rules=rules,

@@ -13,7 +13,7 @@ from springcheck import schemes
 from springcheck.errors import SpringcheckError
 from springcheck.figures.charts import GUIDE, LOWEST, Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of
-from springcheck.figures.naming import labelled
+from springcheck.figures.naming import at_their_ends
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut, left_out
 from springcheck.studies.keeper import document
@@ -261,7 +261,7 @@ def _rank(x: Sweep) -> float:
 def _chart(sweeps: Sequence[Sweep], kind: str, metric: str, short: str) -> Chart:
     """One quantity of these methods over another, the least of it as an envelope."""
     curves, rules, everything = [], [], []
-    triangles: dict[int, Curve] = {}
+    slopes: dict[int, tuple[list[tuple[float, float]], float]] = {}
     cheapest = min(sweeps, key=_rank).method
     for x in sweeps:
         pairs = zip(x.values(kind), x.values(metric), strict=True)
@@ -274,22 +274,24 @@ def _chart(sweeps: Sequence[Sweep], kind: str, metric: str, short: str) -> Chart
             if floor is not None:
                 name = f"floor {floor:.0e}"
                 rules.append(Rule(axis="y", at=floor, name=name, look="floor", group=group))
-            if order and (order not in triangles or x.method == cheapest):
-                triangles[order] = _triangle(order, known, floor or 0.0)
+            if order and (order not in slopes or x.method == cheapest):
+                slopes[order] = known, floor or 0.0
     least, most = (f(e for _, e in everything) for f in (min, max))
-    curves += [*triangles.values(), *[_envelope(everything)] * (kind in COSTS)]
+    parts = enumerate(sorted(slopes.items()), 1)
+    curves += [_triangle(order, *one, i / (len(slopes) + 1)) for i, (order, one) in parts]
+    curves += [_envelope(everything)] * (kind in COSTS)
     shown = 10.0 ** math.floor(math.log10(least)), min(MOST_SHOWN if metric in METRICS else most, 2 * most)
-    return labelled(Chart(
+    return at_their_ends(Chart(
         title=f"{QUANTITIES[metric]} over {QUANTITIES[kind]}.".capitalize(), short=short,
         x=Scale(name=QUANTITIES[kind], log=True), y=Scale(name=QUANTITIES[metric], log=True, shown=shown),
         curves=curves, rules=rules,
-    ), by_name=True)  # fmt: skip
+    ))  # fmt: skip
 
 
-def _triangle(order: int, points: Sequence[tuple[float, float]], floor: float) -> Curve:
-    """A triangle of the slope of an order, below the asymptotic part of a curve."""
+def _triangle(order: int, points: Sequence[tuple[float, float]], floor: float, part: float) -> Curve:
+    """A triangle of the slope of an order, below this part of the asymptotic points of a curve."""
     known = [(c, e) for c, e in points if 1e3 * floor < e < ASYMPTOTIC_ERROR] or [*points]
-    cost, error = known[len(known) // 2]
+    cost, error = known[int(len(known) * part)]
     wide = 0.3
     x = [cost * 10 ** (wide * z) for z in (0, 0, 1, 0)]
     y = [error / 8 * 10 ** (-wide * order * z) for z in (0, 1, 1, 0)]

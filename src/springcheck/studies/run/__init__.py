@@ -9,30 +9,30 @@ _SCENE = argument(*SCENE[0], **SCENE[1], nargs="?")
 
 STUDY = Study(
     name="run",
-    about="run a scene by its default methods or all, compare, store, judge",
+    about="integrate a scene with several methods; compare, judge and store them",
     arguments=(
         _SCENE,
         *store_arguments(),
-        argument("--all", action="store_true", help="by every method, not the default ones alone"),
+        argument("--all", action="store_true", help="run every method, not only the default ones"),
         argument("--step", "--dt", type=float, metavar="H",
                  help="time step in the scene's unit (default: the scene's)"),
         argument("--temperature", metavar="T",
-                 help="a heat bath: 300K, or kT where units are reduced (default: none)"),
+                 help="temperature of a heat bath: 300K, or kT in reduced units (default: none)"),
         argument("--friction", type=float, metavar="G",
-                 help="the bath's friction rate, per unit of time (default 0.1/step)"),
-        argument("--steps", type=int, metavar="N", help="how many steps (default: the scene's)"),
+                 help="friction rate of the bath [1/time] (default 0.1/step)"),
+        argument("--steps", type=int, metavar="N", help="number of steps (default: the scene's)"),
         repeatable(
             "--set", "FIELD=NUMBER",
-            "a number in a field of the scene file, in its units, as spring.0.stiffness=2"
+            "set a number of the scene file, as spring.0.stiffness=2"
         ),
         repeatable(
             "--fault", "NAME[=SIZE]",
-            "an engine broken on purpose among the others; an unknown NAME lists them",
+            "add a deliberately broken engine; an unknown NAME lists them",
         ),
         argument(
             "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
         ),
-        argument("--seed", type=int, metavar="S", help="of random methods (default: drawn)"),
+        argument("--seed", type=int, metavar="S", help="seed of random methods (default: random)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         argument("--left-out", action="store_true", help="print why each method left out did not run"),
         argument(

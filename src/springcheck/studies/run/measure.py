@@ -174,6 +174,8 @@ def run(
                 report = replace(report, verdicts=(*report.verdicts, *more))
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
         report = replace(report, broke=broke)
+        for table in keeper.reference_of(scene):
+            journal.add(table)
         journal.commit(
             scene, comparison=report.comparison, verdicts=report.verdicts, solution=gathered.solution(),
             documents={"run": json.dumps(report.kept_document(), allow_nan=False)},

@@ -1,5 +1,5 @@
 """Charts of a run, in figures and in the report page: phase portrait, position, energy and error, with the
-engines overlaid; for a chain also its modes and its wave, in a bath the temperatures."""
+engines overlaid; in a bath also the temperatures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from springcheck.bath.heat import Heated, heated_of
 from springcheck.checks.compare import EXACT
-from springcheck.figures import chain, energies, looks, portraits
+from springcheck.figures import energies, looks, portraits
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.motion import SMOOTH, Exact, true_motion
 from springcheck.figures.overlay import Runs
@@ -94,12 +94,13 @@ def of_runs(
     if scene.bath is not None:
         heated = heated or [heated_of(scene, [run]) for run in usable.every]
         return [*out, energies.means(usable, scene.thermal), *_temperatures(usable, heated)]
-    if planes := paths(scene):
+    # of a bound pair its bond is shown, and no path
+    if shown[0].what != "length" and (planes := paths(scene)):
         out.append(portraits.phase_portraits(parts, planes, truth, said))
     out.append(energies.energy(usable, exact))
     if exact.known:
         out.append(energies.error(usable, exact))
-    return [*out, *chain.banks(usable, exact)]
+    return out
 
 
 def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:

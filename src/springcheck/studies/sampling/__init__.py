@@ -8,6 +8,6 @@ from springcheck.studies.study import Study
 
 STUDY = Study(
     name="sampling",
-    about="temperatures, precision and limits of thermostats on a spring, with their laws",
+    about="measure temperatures, precision and limits of thermostats",
     arguments=(*team.arguments(), *store_arguments("sampling.h5")),
 )

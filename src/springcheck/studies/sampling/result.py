@@ -22,6 +22,9 @@ from springcheck.text.wording import count, number, seconds
 
 TITLES = ("method", "configurational", "law", "kinetic", "law ", "limit", "law  ", "forces", "time")
 
+DROPPED = ("forces", "law  ", "limit", "law ", "kinetic", "time")
+"""Columns that a narrow terminal does without, the first one first."""
+
 CAPTION = (
     "Temperatures over the bath's at h omega = 0.5 and friction 0.4 omega; the largest stable h omega at",
     "friction omega, rounded down.  Each with its law.",
@@ -130,7 +133,7 @@ class Sampling(Studied):
             rows += [plain(title(name), "italic"), *(x.row for x in self.methods if x.scheme == name)]
         apart = [x.method for x in self.methods if x.departs]
         return [
-            *map(plain, CAPTION), table(TITLES, rows, left=("method",)),
+            *map(plain, CAPTION), table(TITLES, rows, drop=DROPPED),
             *(plain(f"{method}: a temperature is not its law's", "bold red") for method in apart),
         ]  # fmt: skip
 
@@ -150,7 +153,7 @@ class Sampling(Studied):
         said = f"At h {W_SIGN} = {self.methods[0].turn[i]:g}, {right} of {len(off)} schemes right to "
         said += share(IS_RIGHT)
         too = "hot" if off[name] > 0 else "cold"
-        return said if right == len(off) else f"{said}; {name} {share(abs(off[name]))} too {too}"
+        return said if right == len(off) else f"{said}; {name}: {share(abs(off[name]))} too {too}"
 
     def banks(self, **chosen: Any) -> list[Bank]:
         """The two temperatures against the step, and the largest stable step against friction."""
@@ -187,8 +190,8 @@ class Sampling(Studied):
             ],
         )  # fmt: skip
         return [
-            Bank(name="sampling", title="Schemes (lines) and engines (marks)", heading=self.heading,
-                 charts=[*charts, *[limit] * bool(stable)])
+            Bank(name="sampling", title="Schemes (lines) and engines (marks)", foot=self.heading,
+                 heading=self.heading.partition(";")[0], charts=[*charts, *[limit] * bool(stable)])
         ]  # fmt: skip
 
 

@@ -8,6 +8,6 @@ from springcheck.studies.study import Study
 
 STUDY = Study(
     name="stability",
-    about="limits of stability, measured against theory",
+    about="measure stability limits and compare them with theory",
     arguments=(SCENE, *team.arguments(), *store_arguments("SCENE-stability.h5")),
 )

@@ -12,7 +12,6 @@ from springcheck import engines, schemes
 from springcheck.errors import MethodError
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of, title
-from springcheck.figures.naming import labelled
 from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -175,18 +174,18 @@ class Stability(Studied):
         if not marks:
             return []
         edges = sorted({x.best for x in self.limits if 0 < x.best < np.inf})
-        rules = [Rule(axis="y", at=1.0, look="one", name="growing above")]
+        rules = [Rule(axis="y", at=1.0, look="one")]
         rules += [Rule(axis="x", at=x, name=f"limit {rounded_down(x, 4)}") for x in edges]
         here = abs(self.scene.step) * fastest(self.scene)
         if here > min(x.h_w[0] for x in self.limits):
             rules.append(Rule(axis="x", at=here, name="this scene", look="here"))
         h_w = "h \N{GREEK SMALL LETTER OMEGA}"
-        chart = labelled(Chart(
+        chart = Chart(
             title="Spectral radius of one step: lines in theory, marks as measured.",
             x=Scale(name=f"step times frequency, {h_w}", log=True),
-            y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
+            y=Scale(name="spectral radius of one step: above 1 it grows", log=True, shown=(0.1, 100.0)),
             curves=[*lines.values(), *marks], rules=rules,
-        ))  # fmt: skip
+        )  # fmt: skip
         heading = f"Stable up to {h_w} (methods): {self.said(short=True)}"
         return [
             Bank(name="stability", title="Schemes (lines) and methods (marks)", heading=heading,
