@@ -207,7 +207,7 @@ def test_a_mistake_is_an_error_in_the_report(tmp_path: Path) -> None:
         ("--junit", ".", "it is a folder"),
         ("--summary", "no/such/s.md", "there is no folder"),
         ("--junit", "a.csv", "reads or writes that file otherwise"),
-        ("--junit", "notes.txt", "it is there and no such report"),
+        ("--junit", "notes.txt", "the file is no such report"),
     ],
 )
 def test_a_report_takes_no_other_files_place(

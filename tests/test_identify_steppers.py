@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 import springcheck
-from springcheck import checks, doors, driver
+from springcheck import doors
 from springcheck.errors import MethodError
 from springcheck.identify import identify_stepper
-from springcheck.identify.files import shown
-from springcheck.identify.steps import seen_to_take
 from springcheck.schemes import UNKNOWN
 
 Force = Callable[..., Any]
@@ -121,23 +118,6 @@ def test_a_force_kept_from_the_run_before_is_no_number_written_into_the_stepper(
         "force or a state of the run before"
     )
     assert len(found.explanations) == 1
-
-
-@pytest.mark.parametrize(
-    ("name", "made", "claimed", "said"),
-    [("anharmonic", "own:rk2-heun", "rk2-midpoint", "Heun (RK2)"),
-     ("pendulum", "ase:velocity-verlet", "position-verlet", "velocity Verlet"),
-     ("morse-bond", "own:rk4", "velocity-verlet", "classical Runge-Kutta (RK4)")],
-)  # fmt: skip
-def test_a_wrong_claim_on_an_anharmonic_scene_is_answered_by_the_scheme(
-    name: str, made: str, claimed: str, said: str
-) -> None:
-    scene = springcheck.load_scene(name)
-    run = replace(driver.run(scene, made), scheme=claimed)
-    failed = [v for v in checks.explained(scene, run, checks.judge(scene, run), shown) if v.passed is False]
-    assert any(v.why.endswith(f"Every step recorded there is that of {said}") for v in failed), failed
-    longer = driver.run(replace(scene, step=1.001 * scene.step), made)
-    assert seen_to_take(scene, replace(longer, step=scene.step), 50) == ""
 
 
 @pytest.mark.parametrize(("box", "begins"), [(2.0, -1.0), (3.0, -1.5), (10.0, 0.0)])

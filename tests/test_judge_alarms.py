@@ -38,6 +38,16 @@ def one(*terms: Term, m: float = 1.3, q: float = 0.9, p: float = 0.4, **grid: fl
     return clean.scene(np.array([m]), terms, np.array([q]), np.array([p]), **grid)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("name", ["ruth3", "forest-ruth", "yoshida4"])
+def test_a_step_far_beyond_its_limit_is_judged_by_an_area_of_1(name: str) -> None:
+    """Its matrix has elements of 1e8, of which the determinant was computed as 1.0005."""
+    for turn in (21.0, 33.0, 35.5):
+        scene = one(
+            WallSpring(i=np.zeros(1, int), k=2.9, at=0.0), m=1.7, step=turn * (1.7 / 2.9) ** 0.5, steps=10
+        )
+        assert alarms(checks.judge(scene, plain(scene, name))) == []
+
+
 def wall(k: float, at: float = 0.0) -> WallSpring:
     return WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([at]))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -176,7 +175,7 @@ def test_what_single_steps_do_not_see_is_one_spring_and_its_step(
     step = next(v for v in found if v.check == "step-defect")
     assert step.passed is not seen
     assert "any part" not in step.why
-    assert seen or "1 spring and the step could be off by 3% and not be seen in a step" in step.why
+    assert seen or "1 spring and the step wrong by 3%" in step.why
 
 
 @pytest.mark.parametrize(
@@ -318,43 +317,6 @@ def test_rounded_numbers_are_judged_to_their_digits_in_any_format(tmp_path: Path
         else:
             np.savetxt(path, np.c_[*arrays.values()], fmt="%.8f", header="t x v", comments="")
         assert file.judge(path, scene=scene, scheme="velocity-verlet").status == wrong
-
-
-@pytest.mark.parametrize(
-    ("step", "cut", "decimals"),
-    [(0.1, lambda x: repr(int(x * 1e6) / 1e6), 6), (0.17, lambda x: repr(int(x * 1e6) / 1e6), 6),
-     (0.1, lambda x: str(x)[:8], 5)],
-)  # fmt: skip
-def test_decimals_that_are_cut_off_are_named(
-    tmp_path: Path, step: float, cut: Callable[[float], str], decimals: int
-) -> None:
-    """They failed without a cause, or with noise as one; str(x)[:8] leaves one decimal less to -x."""
-    scene = springcheck.load_scene("spring-uneven").derived(step=step)
-    run = driver.run(scene, "own:velocity-verlet")
-    rows = [[repr(t), cut(q), cut(p)] for t, q, p in np.c_[run.t, run.q, run.p].tolist()]
-    (tmp_path / "a.csv").write_text("t,q,p\n" + "\n".join(map(",".join, rows)))
-    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
-    assert f"by up to {0.5 * 10.0**-decimals:.1g}" in " ".join(found.notes)
-    assert found.status == 1
-    assert checks.cause_of(found.verdicts).startswith("the decimals of the file are cut off, towards 0")
-    wrong = file.judge(tmp_path / "a.csv", scene=scene, scheme="position-verlet")
-    assert "cut off" not in checks.cause_of(wrong.verdicts)
-
-
-@pytest.mark.parametrize("name", ["spring", "spring-uneven", "chain"])
-def test_positions_and_momenta_that_are_exchanged_are_named(tmp_path: Path, name: str) -> None:
-    """It was said that frame 0 did not belong to the motion, or that the scheme had memory."""
-    scene = springcheck.load_scene(name)
-    run = driver.run(scene, "own:velocity-verlet")
-    names = [f"{x}{i}" for x in "qp" for i in range(scene.n)]
-    rows = np.concatenate([run.p, run.q], axis=1)
-    rows[0] = [*run.q[0], *run.p[0]]
-    np.savetxt(
-        tmp_path / "a.csv", np.c_[run.t, rows], "%.17g", ",", header=",".join(["t", *names]), comments=""
-    )
-    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
-    assert found.status == 1
-    assert "positions and momenta are exchanged from frame 1 on" in checks.cause_of(found.verdicts)
 
 
 def test_subnormal_numbers_of_single_precision_are_judged_to_what_they_hold(tmp_path: Path) -> None:

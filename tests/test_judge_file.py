@@ -245,7 +245,7 @@ def test_a_scheme_of_a_bath_is_refused_where_there_is_none(
     np.savetxt(path, np.c_[T, Q, P], fmt="%.17g", delimiter=",", header="t,q,p", comments="")
     mine.write_text("def step(q, p, h, force, mass):\n    return q, p\n")
     assert main(["judge", str(path), "--scene", str(text), "--scheme", "baoab"]) == 2
-    assert "baoab needs a bath, which [bath] gives: scene mine has none" in capsys.readouterr().err
+    assert "baoab needs a heat bath, and scene mine has none: add [bath] to it" in capsys.readouterr().err
     store = tmp_path / "s.h5"
     assert main(["run", "spring", "--stepper", f"{mine}:step", "--scheme", "baoab", "-o", str(store)]) == 2
     assert "for scenes with a bath" in capsys.readouterr().err

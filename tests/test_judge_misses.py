@@ -13,6 +13,7 @@ import clean
 import springcheck
 import textbook as steppers
 from springcheck import checks, schemes
+from springcheck.checks import sight, stretch
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
@@ -316,6 +317,42 @@ def test_a_light_one_among_many_joined_particles_is_seen() -> None:
     p = run.p.copy()
     p[3:, 0] *= 1 + 1e-9
     assert "step-defect" in failed(scene, replace(run, p=p))
+
+
+@EXTENDED
+@pytest.mark.parametrize("scheme", ["velocity-verlet", "rk4", "implicit-midpoint"])
+def test_tangents_in_doubles_bound_what_extended_ones_do(scheme: str) -> None:
+    """Of the same random signs; the ends are the same, and no allowance differs but in its last digits."""
+    scene = lattice(40, 1, light=0.3)
+    run = plain(scene, scheme)
+    case = checks.Case(trajectory=run, scene=scene)
+    start = run.q[:3].astype(np.longdouble), run.p[:3].astype(np.longdouble)
+    coarse, told = stretch._in_width(case, *start, 30, np.float64)
+    fine, _ = stretch._in_width(case, *start, 30, np.longdouble)
+    assert told
+    assert np.array_equal(coarse.end, fine.end)
+    assert np.all(np.abs(coarse.allowance / fine.allowance - 1) < 1e-9)
+    # numbers that leave the range of doubles are followed in extended precision
+    with np.errstate(all="ignore"):
+        assert not stretch._in_width(case, 1e306 * start[0], 1e306 * start[1], 30, np.float64)[1]
+
+
+@pytest.mark.parametrize("scheme", ["semi-implicit-euler", "rk4", "implicit-midpoint"])
+def test_derivatives_are_those_of_differences(scheme: str) -> None:
+    """By the step, and by one spring of several: their limits of detection follow from these."""
+    scene = lattice(5, 1, light=0.3)
+    case = checks.Case(trajectory=replace(plain(scene, scheme), every=7), scene=scene)
+    at, change = np.arange(3), 2.0**-20
+    term, number = scene.terms[0], 2
+    part = replace(term, **{name: x[number : number + 1] for name, x in term.arrays.items()})
+    found = stretch.derivatives(case, case.trajectory.q[at], case.trajectory.p[at], 7, [{term: part}])
+    right = sight.ends(case, at)
+    rows = 0, slice(number, number + 1)
+    for j, one in enumerate(
+        (sight.changed(case, "step", change), sight.changed(case, "stiffness", change, rows))
+    ):
+        for by, here, there in zip(found, right, sight.ends(one, at), strict=True):
+            assert np.max(np.abs((there - here) / change - by[j])) < 1e-4 * np.max(np.abs(by[j]))
 
 
 SHARP = [("rk4", 3), ("forest-ruth", 3), ("yoshida4", 3)]

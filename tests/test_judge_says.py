@@ -329,34 +329,3 @@ def test_a_friction_that_the_scene_does_not_have_is_the_cause(tmp_path: Path) ->
     said = checks.cause_of(found)
     assert said.startswith("Velocity Verlet with friction")
     assert said.endswith("its c/m is 0.002, and the scene has none")
-
-
-@pytest.mark.parametrize("to", ["energy", "temperature", "momentum"])
-@pytest.mark.parametrize("n", [1, 2])
-def test_what_is_rescaled_after_each_step_is_said_to_be(tmp_path: Path, to: str, n: int) -> None:
-    """One factor of a state was "a scheme of several steps"; a scheme without noise that looked like a
-    thermostat ended in a KeyError."""
-    m, k, q, p = np.array([[3.7, 1.1], [2.9, 5.3], [0.3, -0.2], [0.7, 0.9]])[:, :n]
-    walls = WallSpring(i=np.arange(n), k=k, at=np.zeros(n))
-    scene, rows = clean.scene(m, (walls,), q, p, step=0.1, steps=300), []
-    energy = np.sum(p * p / m + k * q * q)
-    for i in range(301):
-        rows.append((0.1 * i, *q, *p))
-        p = p - 0.05 * k * q
-        q = q + 0.1 * p / m
-        p = p - 0.05 * k * q
-        if to == "energy":
-            factor = np.sqrt(energy / np.sum(p * p / m + k * q * q))
-            q, p = q * factor, p * factor
-        elif to == "temperature":
-            p = p * np.sqrt(0.98 + 0.02 * n / np.sum(p * p / m))
-        else:
-            p = p * (1 - 1e-4)
-    header = ",".join(["t", *(f"{x}{i}" for x in "qp" for i in range(n))])
-    np.savetxt(tmp_path / "a.csv", rows, fmt="%.17g", delimiter=",", header=header, comments="")
-    said = checks.cause_of(file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet").verdicts)
-    what = {"energy": "positions and momenta", "temperature": "momenta"}.get(to, "")
-    # the momentum of one particle may be any multiple of the one before
-    shows = to == "energy" or (to == "temperature" and n == 2)
-    assert (f"all {what} are multiplied by one factor after it" in said) == shows
-    assert ("with friction" in said) == (to == "momentum")

@@ -205,7 +205,7 @@ def trr(atoms: Callable[[int], int]) -> bytes:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("x.trr", trr(lambda i: 1 + (i > 5)), "not of as many particles each"),
+        ("x.trr", trr(lambda i: 1 + (i > 5)), "the number of particles changes from frame to frame"),
         ("x.csv.gz", gzip.compress(table(T, Q, V).encode())[:-9], "packed is damaged or cut off"),
         ("x.csv.gz", gzip.compress(bytes(9999))[:10] + b"\xff" * 99, "packed is damaged or cut off"),
         ("x.dump", dump(lambda i: 1)[:-9].encode(), "fewer words than it should have"),
@@ -418,6 +418,9 @@ def test_energies_alone_are_said_to_be_that(head: str) -> None:
     Path("x.csv").write_text(table(*many, head=head))
     with pytest.raises(StoreError, match=r"energies alone.*changes by .* of its size.*record positions"):
         read("x.csv")
+    np.savez("x.npz", t=T, E_tot=np.stack([Q, V], axis=1))
+    with pytest.raises(StoreError, match=r"energies alone.*E_tot changes by"):
+        read("x.npz")
 
 
 def test_coordinates_as_gromacs_writes_them_are_those_of_its_atoms() -> None:

@@ -52,6 +52,7 @@ data/README
 src/springcheck/engines/README
 .github/actions/judge/README
 validation/lesson/lesson
+validation/lesson/ten-minutes
 ```
 
 ```{toctree}

@@ -113,12 +113,12 @@ def assert_right(scene: Scene, run: Trajectory) -> None:
 def _shown(scene: Scene, run: Trajectory, about: int, few: bool) -> str:
     """Cause that the states of a failed run show; or that SciPy or h5py, which would find it, is missing."""
     try:
-        from springcheck.identify import files
+        from springcheck.identify import scenes
     except ModuleNotFoundError as error:
         if error.name and error.name.partition(".")[0] in ("scipy", "h5py"):
             return "with SciPy installed, this line says what they are"
         raise
-    return files.shown(scene, run, about, few)
+    return scenes.diagnosis(scene, run, about, few)
 
 
 def uneven_scenes() -> Iterator[Scene]:

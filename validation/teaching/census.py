@@ -199,14 +199,12 @@ TEXT = """# A census of teaching code
 that name a scheme {right} are that scheme to rounding and {wrong} are not; {none} name none.
 
 A step stands for the idea and not for its author. A question on a forum is there because somebody asked for
-help; answers are in the table too. Hamiltonian Monte Carlo reverses the momentum on purpose. Sources with a
-slash are GitHub repositories, and may have changed since. "Read" says how: the whole step in a stored excerpt
-of the page, or from memory, as it is widely known. [census.py](census.py) has the transcriptions.
+help; answers are in the table too. Hamiltonian Monte Carlo reverses the momentum on purpose. Sources such
+as NAME/REPOSITORY are on GitHub, and may have changed since. "Read" says how: the whole step in a stored
+excerpt of the page, or from memory, as it is widely known. [census.py](census.py) has the transcriptions.
 
 ## Not the scheme that the text names, or none named
 
-| step | source | named | identified |
-|---|---|---|---|
 {others}
 
 ## All steps
@@ -229,7 +227,8 @@ def main(*arguments: str) -> int:
     if few:
         with (HERE / "census.csv").open(newline="", encoding="utf-8") as file:
             known = {row["step"]: row for row in csv.DictReader(file)}
-        wrong = [row["step"] for row in rows if row != known[row["step"]]]
+        # the words of what is identified may change
+        wrong = [row["step"] for row in rows if row["as_named"] != known[row["step"]]["as_named"]]
         print("as in census.csv" if not wrong else f"not as in census.csv: {', '.join(wrong)}")
         return bool(wrong)
     with (HERE / "census.csv").open("w", newline="", encoding="utf-8") as file:
@@ -238,7 +237,7 @@ def main(*arguments: str) -> int:
     others = [row for row in rows if row["as_named"] != "yes"]
     text = TEXT.format(
         n=len(rows), named=count["yes"] + count["no"], right=count["yes"], wrong=count["no"], none=count["-"],
-        others="\n".join("| {step} | {source} | {named} | {identified} |".format(**row) for row in others),
+        others="\n".join("* **{step}** ({source}), named {named}: {identified}.".format(**x) for x in others),
         all="\n".join("| {step} | {source} | {named} | {as_named} | {read} |".format(**row) for row in rows),
     )  # fmt: skip
     (HERE / "README.md").write_text(text, encoding="utf-8")

@@ -183,12 +183,12 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     verdicts = checks.judge(found, run)
     if (status := checks.status(verdicts)) == 0:
         return Verdicts(verdicts)
-    from springcheck.identify import files
+    from springcheck.identify import scenes
 
     if status == 1:
-        return Verdicts(checks.explained(found, run, verdicts, files.shown))
+        return Verdicts(checks.explained(found, run, verdicts, scenes.diagnosis))
     with suppress(ArithmeticError, ValueError), np.errstate(all="ignore"):
-        return Verdicts(verdicts, shown=files.shown(found, run, 0))
+        return Verdicts(verdicts, shown=scenes.diagnosis(found, run, 0))
     return Verdicts(verdicts)
 
 

@@ -30,7 +30,7 @@ def one_rounding(
     scene: Scene, sizer: Stepper, start: tuple[Reals, Reals], draws: Sequence[Any], hit: Any,
     how: Arithmetic, rebuilt: bool,
 ) -> tuple[Extended, Extended]:  # fmt: skip
-    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n)."""
+    """One rounding of the sum of absolute terms of a step, for q and for p (..., n)."""
     assert scene.bath is not None
     size, unit, x = np.abs(start[0]), how.state, scene.bath.friction * abs(scene.step)
     once, wide = unit * roundings_of(sizer.scheme), how.force / unit * (how.force > unit)

@@ -114,11 +114,9 @@ def explained(
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
     if first is None:
         return list(verdicts)
-    # imported here: only failures are explained
-    from springcheck.checks import causes
-
-    case = Case(trajectory=run, scene=scene)
-    said = causes.found(case, lambda first, few: shown(scene, run, first, few))
+    frame, few = seldom_off(Case(trajectory=run, scene=scene))
+    with np.errstate(all="ignore"):
+        said = shown(scene, run, frame, bool(few)) or few
     why = f"{first.why}{DIAGNOSIS}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
@@ -177,7 +175,7 @@ def judge(
     case = Case(trajectory=trajectory, scene=scene, piece=piece)
     if (random := case.law.has("random")) and scene.bath is None:
         raise MethodError(
-            f"{trajectory.scheme} needs a bath, which [bath] gives: scene {scene.name} has none"
+            f"{trajectory.scheme} needs a heat bath, and scene {scene.name} has none: add [bath] to it"
         )
     return shared([one(case) for one in ((RANDOM if random else CHECKS) if checks is None else checks)])
 

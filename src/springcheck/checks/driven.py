@@ -126,7 +126,7 @@ def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
 
 @check("drive", family="motion", requires=MAP | {"driven", "resolved"}, telling=False)
 def drive(case: Case) -> Finding | str:
-    """The time of a drive is that at which the scheme takes it within its step.
+    """A drive is evaluated at those times within a step at which the scheme evaluates it.
 
     The delay of all drives, in steps, by linear least squares over all steps.  Each residual may be wrong by
     the scheme's roundings, which are added up with the worst signs.  Where no time and no other drive

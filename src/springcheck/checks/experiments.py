@@ -104,7 +104,7 @@ def determinant(bench: Bench) -> Finding | str:
 
 @check("sympl", family="map", requires=MATRIX | {"symplectic", "undamped"})
 def symplecticity(bench: Bench) -> Finding | str:
-    """The one-step matrix keeps the symplectic form: M^T J M = J, to rounding."""
+    """The one-step matrix is symplectic, M^T J M = J, to rounding."""
     if why_no_step := _no_step(bench.copies[0]):
         return Finding(np.inf, 0.0, "of an action", why_no_step)
     ideal, departure, allowed = _matrices(bench)
@@ -142,7 +142,7 @@ def _shifted(case: Case, q: Reals, p: Reals, sign: int) -> tuple[Reals, Reals]:
 
 @check("reverse", family="map", requires={"one-step", "undamped", "reversible", "autonomous"})
 def reversibility(bench: Bench) -> Finding | str:
-    """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
+    """A run, momenta reversed, and a second run lead back to the initial state, to rounding."""
     out = bench.trajectory
     steps = len(out.t) - 1
     case = Case(trajectory=out, scene=bench.scene)
@@ -227,7 +227,7 @@ def _against(
 
 @check("mirror", family="repeat", requires={"one-step", "undamped", "autonomous"})
 def mirror(bench: Bench) -> Finding | str:
-    """A negative step does what flipped momenta do, bit for bit."""
+    """A negative step is a positive one with reversed momenta, bit for bit."""
     scene = replace(bench.scene, steps=min(bench.scene.steps, 20), every=1)
     flipped = bench.run(replace(scene, p=-scene.p), bench.label)
     back = bench.run(replace(scene, step=-scene.step), bench.label)
@@ -238,7 +238,7 @@ def mirror(bench: Bench) -> Finding | str:
 
 @check("turned", family="repeat", requires={"three-dimensions", "one-step"})
 def orientation(bench: Bench) -> Finding | str:
-    """The scene turned, x to y to z to x, does the same, bit for bit."""
+    """The scene rotated, x to y to z to x, gives the rotated trajectory, bit for bit."""
     alone, places = bench.trajectory, bench.scene.all_places
     steps = len(alone.t) - 1
     if steps < 1:
@@ -258,7 +258,7 @@ def orientation(bench: Bench) -> Finding | str:
 
 @check("company", family="repeat", requires={"one-step", "explicit", "linear"})
 def company(bench: Bench) -> Finding | str:
-    """A livelier copy next to it, which acts on nothing of it, changes no number of the motion."""
+    """An uncoupled copy with more energy changes no number of the trajectory."""
     alone, scene, n = bench.trajectory, bench.scene, bench.scene.n
     steps = len(alone.t) - 1
     if steps < 1:

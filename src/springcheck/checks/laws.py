@@ -51,13 +51,13 @@ DURATION = 2.5 / np.sqrt(2.9 / 3.7)
 
 @check("order", family="law", requires={"one-step"})
 def order(bench: Bench) -> Finding | str:
-    """On a spring the error falls with the scheme's power of the step."""
+    """On a spring the error falls with the scheme's order."""
     return _order(bench, SPRING, "spring")
 
 
 @check("order, quartic", family="law", requires={"one-step"})
 def order_anharmonic(bench: Bench) -> Finding | str:
-    """In a quartic potential, where order cannot lie, the error falls with the scheme's power of the step."""
+    """In a quartic potential, where errors do not cancel, the error falls with the scheme's order."""
     return _order(bench, WELL, "quartic potential")
 
 
@@ -168,7 +168,7 @@ WALK = frozenset({"one-step", "splitting", "symplectic", "double"})
 
 @check("bias", family="law", requires=WALK)
 def rounding_bias(bench: Bench) -> Finding | str:
-    """Rounding makes the shadow energy walk, not drift, beyond what the arithmetic implies."""
+    """The shadow energy drifts no more than the stated arithmetic implies."""
     if any(_is_short(bench, h) for h in (ODD, EVEN)):
         return Finding(np.inf, 0.0, "per step", SHORT)
     found = [_drift(bench, h) for h in (ODD, EVEN)]
@@ -177,7 +177,7 @@ def rounding_bias(bench: Bench) -> Finding | str:
     # the first that is no number, or else the worse
     worst = int(np.argmax(off / limit))
     if np.all(off <= limit) and np.max(limit) >= (most := schemes.roundings(bench.scheme) * 2.0**-52):
-        return f"its random walk hides even {most:.1e} per step, the bias of every rounding together"
+        return f"rounding noise would hide even the largest bias, {most:.1e} per step"
     seen = "; ".join(
         f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} per step, implied is {implied:.1e}"
         for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)
@@ -210,7 +210,7 @@ def _drift(bench: Bench, h: float) -> tuple[float, float, float]:
 
 @check("growth", family="law", requires=WALK)
 def rounding_growth(bench: Bench) -> Finding | str:
-    """The shadow energy's rounding grows no faster than a random walk, with the square root of the steps."""
+    """The rounding error of the shadow energy grows as a random walk, with the square root of the steps."""
     scene = ensemble(ODD)
     run = bench.once(scene)
     if _is_short(bench, ODD):

@@ -20,7 +20,7 @@ from springcheck.text.wording import count
 
 @check("closed", family="motion", requires=MAP | {"unmixed", "closed"})
 def closed_form(case: Case) -> Finding | str:
-    """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
+    """The trajectory is the scheme's own discrete solution, phase included, as 2 asin(h w/2) per step."""
     modes = case.undriven.system.modes
     q, p = modes.from_centres(*case.closed_states)
     distance = case.system.norm.size(case.trajectory.q - q, case.trajectory.p - p)
@@ -116,7 +116,7 @@ def shadow_energy(case: Case) -> Finding | str:
 
 @check("freq", family="motion", requires=CLOSED | {"undamped"})
 def frequency(case: Case) -> Finding | str:
-    """The phase turns by the scheme's own frequency, to rounding."""
+    """The phase advances with the scheme's own frequency, to rounding."""
     turn = schemes.rotation(case.law.propagator)
     u0, v0 = case.mode_start
     strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
@@ -228,7 +228,7 @@ def momentum(case: Case) -> Finding | str:
 
 @check("angular", family="motion", requires=MAP | {"alike", "one-area"}, telling=False)
 def angular_momentum(case: Case) -> Finding | str:
-    """Angular momentum q_x p_y - q_y p_x is kept where a step keeps area, and changes by its determinant."""
+    """Angular momentum q_x p_y - q_y p_x changes by the determinant of a step: 1 for symplectic ones."""
     # a step that is one linear map A on both axes changes the area that they span, summed over particles, by
     # det A, or not at all where A is symplectic: Hairer, Lubich & Wanner, chapter VI.2
     run, (steps, start) = case.trajectory, case.begun

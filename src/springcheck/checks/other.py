@@ -1,4 +1,4 @@
-"""The one number of a scene, or the one frame, that is another than it should be where steps are wrong.
+"""The one number of a scene that is another than it should be where steps are wrong.
 
 Of each number the value is sought by which all steps are the scheme's own: Newton's method on the sum of
 squares of what the steps miss.
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,9 +29,10 @@ SQUARES_FALL = 4.0
 """Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
 MOST_ALONE = 16
 """Objects of a term, or particles, that are looked at one by one, and in pairs: those farthest off."""
+MOST_NUMBERS = 1 << 13
+"""Coordinates times steps between frames up to which numbers are sought, and those of all frames by which."""
 NEAR_SINGLE = 2.0**-40
 """Relative distance from a number's single precision, 2**-24 off it at most, within which a value is that."""
-SAME = "each step is the scheme's own"
 
 Number: TypeAlias = tuple[str, float, float, Callable[[float], Case]]
 """A number in words, its value, the least size of changes of it, and the case where it has another value."""
@@ -68,18 +68,14 @@ class Kind:
 
 
 def found(case: Case) -> str:
-    """The cause in one sentence, or "" where neither one number nor one frame explains the states."""
-    if missing(case, MAP) or case.ahead is None or case.scene.kind != "particles":
+    """That number with both of its values, or "" where no one number explains the states."""
+    cost = case.scene.n * case.trajectory.every
+    if missing(case, MAP) or cost > MOST_NUMBERS or case.ahead is None or case.scene.kind != "particles":
         return ""
     case = case.clocked
     with np.errstate(all="ignore"):
         values = ((name, own, _value(case, own, size, of)) for name, own, size, of in _numbers(case))
-        shown = dict.fromkeys(_said(name, own, x) for name, own, x in values if x is not None)
-        if shown:
-            return f"{SAME} with another number, {either([*shown])}"
-        # what is off by no more than the slack of a fit fits without an exchange as well
-        ways = () if _fits(case, case) else _exchanged(case)
-        return next((f"{SAME} with {words}" for words, of in ways if _fits(case, of)), _frame(case))
+        return either([*dict.fromkeys(_said(name, own, x) for name, own, x in values if x is not None)])
 
 
 def _said(name: str, own: float, value: float) -> str:
@@ -105,7 +101,7 @@ def _off(case: Case, other: Case, at: Integers) -> Extended:
 
 def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> float | None:
     """The value of a number by which all steps are the scheme's own, or None."""
-    at, x, left = sight.rows(case, len(case.trajectory.t) - 1), own, np.inf
+    at, x, left = _rows(case), own, np.inf
     for _ in range(VALUE_STEPS):
         change, here = sight.CHANGE * max(abs(x), size), _off(case, of(x), at)
         slope = (_off(case, of(x + change), at) - here) / change
@@ -117,6 +113,12 @@ def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> 
     if not (np.max(np.abs(here)) <= VALUE_SLACK and abs(x - own) > error):
         return None
     return (x if abs(x) > error else 0.0) if _fits(case, of(x)) else None
+
+
+def _rows(case: Case) -> Integers:
+    """A few frames, fewer of many particles."""
+    at = sight.rows(case, len(case.trajectory.t) - 1)
+    return at[:: max(1, len(at) * case.scene.n * case.trajectory.every // MOST_NUMBERS)]
 
 
 def with_numbers(case: Case, number: int, field: str, values: Floats) -> Case:
@@ -143,18 +145,8 @@ def _fits(case: Case, other: Case) -> bool:
     """Whether all steps are the scheme's own in another case."""
     every = np.arange(len(case.trajectory.t) - 1)
     # some of them tell nearly all others
-    parts = sight.rows(case, len(every)), every
+    parts = _rows(case), every
     return all(np.max(np.abs(_off(case, other, at))) <= VALUE_SLACK for at in parts)
-
-
-def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
-    """Cases in which two particles have exchanged their masses, or two springs or bonds a number."""
-    for kind in _kinds(case):
-        for (one, mine), (two, its) in combinations(kind.farthest(kind.objects), 2):
-            swapped = kind.numbers.copy()
-            if np.sum(mine) == np.sum(its) and np.any(swapped[mine] != swapped[its]):
-                swapped[mine], swapped[its] = swapped[its], swapped[mine]
-                yield f"the {kind.name} of {one} and that of {two} exchanged", kind.other(swapped)
 
 
 def _kinds(case: Case) -> Iterator[Kind]:
@@ -218,18 +210,3 @@ def _numbers(case: Case) -> Iterator[Number]:
     if sum(term.kind == "potential" for term in scene.terms) > 1:
         yield "a factor to every force", 1.0, 0.0, lambda x: sight.of_scene(case, scene.system.scaled(x))
     yield "the step", run.step, 0.0, lambda x: sight.changed(case, "step", x / run.step - 1)
-
-
-def _frame(case: Case) -> str:
-    """The one frame from which on states are a step too late or too early, or ""."""
-    assert case.ahead is not None
-    run, unit = case.trajectory, case.roundings * case.ahead.allowance
-    off = np.flatnonzero(~np.all(np.abs(_off(case, case, np.arange(len(run.t) - 1))) <= 1, axis=(0, 2)))
-    if len(off) != 1 or run.every > 1:
-        return ""
-    i, states = int(off[0]), np.stack([run.q, run.p])
-    if np.array_equal(states[:, i], states[:, i + 1]):
-        return f"{SAME}, but frame {i + 1} is the one before it once more"
-    twice = np.stack(case.step(*case.step(*states[:, i : i + 1].astype(np.longdouble))))
-    missed = np.all(np.abs(twice - states[:, i + 1 : i + 2]) <= VALUE_SLACK * unit[:, i : i + 1])
-    return f"{SAME}, but a frame is missing before frame {i + 1}" if missed else ""

@@ -14,7 +14,7 @@ from springcheck.text.wording import count
 
 @check("start", family="record", requires={"start"})
 def start(case: Case) -> Finding:
-    """Row 0 is the start, exactly, or rounded once to the numbers of a recording."""
+    """The first frame is the initial state, exactly or rounded once to the precision of the file."""
     run, scene = case.trajectory, case.scene
     off = np.abs([run.q[0] - scene.q, run.p[0] - scene.p])
     recorded = run.arithmetic.name == AS_WRITTEN and not run.arithmetic.is_double
@@ -26,7 +26,7 @@ def start(case: Case) -> Finding:
 
 @check("times", family="record")
 def times(case: Case) -> Finding:
-    """Times are the number of steps times the step, rounded once, up to where the run says it ended."""
+    """Times are n h, rounded once, up to the stated end of the run."""
     run = case.trajectory
     off = np.abs(run.t - case.steps * run.step)
     missing = abs(float(case.steps[-1]) - run.outcome.step) * abs(run.step)
@@ -36,8 +36,7 @@ def times(case: Case) -> Finding:
 
 @check("grid", family="record")
 def grid(case: Case) -> Finding:
-    """The trajectory is the one that the scene asks for: its step, frames, quantities and tolerance, to its
-    end."""
+    """Step, frames, quantities and tolerance are those of the scene."""
     run, scene = case.trajectory, case.scene
     wrong = []
     if run.step != scene.step:
@@ -135,7 +134,7 @@ stop at 0.999 of it, so as not to take a speed that was cut down to the limit fo
 
 @check("line", family="record", requires={"three-dimensions"})
 def line(case: Case) -> Finding:
-    """Along axes that the scene leaves out nothing moves, exactly."""
+    """Nothing moves along the axes that the scene leaves out, exactly."""
     off = case.trajectory.off_axis
     assert off is not None
     # of a start whose forces overflow there may be no second frame, whose step would tell it

@@ -80,7 +80,7 @@ def _no_answer(case: Any) -> str | None:
     if alone is case:
         return None
     if case.scheme.has("flow") or case.steps[0] != 0:
-        return "the response to a drive is known for schemes that evaluate forces, from step 0"
+        return "the response to a drive is known only for schemes that evaluate forces, and from step 0 on"
     found = schemes.rotation(alone.law.propagator)
     if case.sums_steps:
         return "the discrete response to a drive is known for times n h, and these times are running sums"
@@ -95,14 +95,14 @@ _ALL = (
     Requirement("three-dimensions", "an engine in three dimensions", _unless(
         lambda x: x.trajectory.off_axis is not None,
         "the engine is given coordinates, not points in space")),
-    Requirement("energies", "energies that are asked for", _unless(
+    Requirement("energies", "recorded energies", _unless(
         lambda case: case.trajectory.energy is not None, "the scene keeps no energies")),
-    Requirement("unheld", "nothing that holds a particle", _unless(
+    Requirement("unheld", "no fixed particle", _unless(
         lambda x: all(term.bodies > 1 for term in x.scene.terms),
         "walls and fixed potentials take up momentum")),
     Requirement("driven", "a force that depends on the time", _unless(
         lambda x: x.scene.system.is_driven, "no force depends on the time")),
-    Requirement("alike", "two axes along which the same springs act", _unless(
+    Requirement("alike", "two axes with equal springs", _unless(
         lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
     Requirement("named", "a scheme that is named", _trait(
         "named", "its scheme is not known; --scheme NAME states it")),
@@ -133,7 +133,7 @@ _ALL = (
         "splitting", "only a splitting keeps a shadow energy that its own arithmetic does not solve for")),
     Requirement("symplectic", "a symplectic scheme", _trait(
         "symplectic", "{title} does not claim to be symplectic")),
-    Requirement("reversible", "a scheme that undoes its steps", _unless(
+    Requirement("reversible", "a reversible scheme", _unless(
         lambda x: x.scheme.has("reversible") or len(x.scheme.stages) == 2,
         "{title} is not its own adjoint: only another scheme undoes its steps")),
     Requirement("double", "double precision", _unless(
@@ -141,7 +141,7 @@ _ALL = (
         "the rounding of its forces hides that of its steps")),
     Requirement("linear", "a linear scene", _trait(
         "linear", "an anharmonic or driven step is no matrix; step-defect judges it")),
-    Requirement("unmixed", "springs that act at one time", _unless(
+    Requirement("unmixed", "springs that act at the same time", _unless(
         lambda x: not x.law.has("mixes"),
         "slow and fast springs act at different times: no normal mode stays by itself")),
     Requirement("modes", "normal modes", _unless(
@@ -150,9 +150,9 @@ _ALL = (
         f"couples its modes, or more than {MOST_JOINED} particles are joined")),
     Requirement("few", f"{LARGEST} particles at most", _unless(
         lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),
-    Requirement("resolved", "a step that doubles resolve", _too_long),
-    Requirement("phase", "a step that turns", _no_phase),
-    Requirement("closed", "normal modes and a step that turns, driven or not", lambda case: (
+    Requirement("resolved", "a step that double precision resolves", _too_long),
+    Requirement("phase", "a step that oscillates", _no_phase),
+    Requirement("closed", "normal modes and a step that oscillates, driven or not", lambda case: (
         missing(case.undriven, {"modes", "phase"}) or _no_answer(case))),
 )  # fmt: skip
 

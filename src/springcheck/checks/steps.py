@@ -215,8 +215,8 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
 
 
 def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(None)) -> Reals:
-    """Residual of the equation of positions of an implicit step (`Case.residual`) for errors (r, n) of states
-    after these frames, in its roundings; 0 for a scheme without such an equation."""
+    """Residual of an implicit step's equation for positions (`Case.residual`) for errors (r, n) of the states
+    after these frames, in units of its rounding; 0 for an explicit scheme."""
     if case.residual is None:
         return np.zeros_like(off_q)
     way, added = case.residual
@@ -271,7 +271,7 @@ def fastest(case: Case) -> float:
 
 @check("arith", family="motion", requires=MAP | {"resolved"})
 def arithmetic(case: Case) -> Finding | str:
-    """The size of the step defect is that of the arithmetic the method says it has."""
+    """The size of the step defect is that of the stated arithmetic."""
     named = case.trajectory.arithmetic
     plain = Arithmetic()
     if named.is_double and named.force <= plain.force and not named.quantum:

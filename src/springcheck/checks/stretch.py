@@ -256,7 +256,7 @@ def _to_one_side(case: Claim) -> float:
 
 
 def _walk(case: Claim) -> float:
-    """The variance of what one step rounds at random, in squares of its allowance."""
+    """Variance of the random rounding error of one step, in units of its squared allowance."""
     return 2 * _times(case) / 3
 
 

@@ -64,7 +64,7 @@ def check_paths(options: Namespace) -> None:
         if name == "junit" and place.is_file() and place.stat().st_size:
             with place.open("rb") as file:
                 if file.read(len(HEAD)) != HEAD:
-                    raise SpringcheckError(f"{said}: it is there and no such report; name another")
+                    raise SpringcheckError(f"{said}: the file is no such report; give another name")
 
 
 def report(options: Namespace, document: dict[str, Any], status: int) -> None:

@@ -57,11 +57,11 @@ def _plot(options: Namespace) -> int:
         raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
     ours = not options.columns and (not path.is_file() or formats.is_store(path))
     if ours and options.step is not None:
-        raise SpringcheckError(f"{path}: --step goes with the file of another program")
+        raise SpringcheckError(f"{path}: --step is for files of other programs; a store has its step")
     doubts = output.doubts(options.file) if ours else []
     with output.warned(options.file, doubts):
         if ours and options.trajectory is None:
-            written, notes = drawing.draw(path, into, particle=options.particle)
+            written, notes = drawing.draw(path, into, particle=options.particle, x=options.x, y=options.y)
         else:
             which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
             written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
@@ -220,7 +220,7 @@ def _look_on(
     """As `_look`, of a file of a scene, whose force is known."""
     from springcheck import schemes
     from springcheck.cli import taken
-    from springcheck.identify.steps import on_scene
+    from springcheck.identify.scenes import of_scene
     from springcheck.physics.scenefile import load_scene
 
     schemes.bring(schemes.UNKNOWN)
@@ -229,7 +229,7 @@ def _look_on(
             path, found = Path(file), load_scene(scene)
             states = taken.states_in(path, columns, stated["step"], trajectory)
             judged, run, notes, _ = taken.as_trajectory(path, states, found, schemes.UNKNOWN.name)
-            return {path.name: on_scene(judged, run, notes)}, []
+            return {path.name: of_scene(judged, run, notes)}, []
     except (SpringcheckError, OSError) as error:
         return error
 
@@ -318,6 +318,8 @@ COMMANDS = (
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         argument("--particle", type=int, metavar="I",
                  help="draw this particle only, 0 or more (default: all)"),
+        argument("--x", metavar="NAME", help="of a study of precision: time, calls, or an error"),
+        argument("--y", metavar="NAME", help="the error along y: largest, end, energy or phase"),
         _NAMES,
         _STEPS,
         _GROUP,
@@ -361,7 +363,7 @@ COMMANDS = (
     Command("judge", "judge a trajectory of any program by its scheme", _judge, (
         argument("file", metavar="FILE", help=f"a store, or a file of any program: {FORMATS}"),
         argument("--scene", required=True, metavar="SCENE", help="the scene of the trajectory"),
-        argument("--scheme", required=True, metavar="NAME", help="the scheme to judge it by"),
+        argument("--scheme", metavar="NAME", help="the scheme to judge it by (default: the one it shows)"),
         _NAMES,
         _GROUP,
         _STEPS,

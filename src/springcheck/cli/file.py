@@ -13,16 +13,21 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.cli import shown
 from springcheck.cli.taken import as_trajectory, states_in
-from springcheck.identify import files
+from springcheck.errors import StoreError
+from springcheck.formats import States
+from springcheck.identify import scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.physics.trajectory import Verdict
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import choose, keeper
 from springcheck.studies.choose import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step|less than double precision"
+
+DIFFERENCE_ROUNDINGS = 4
+"""Roundings of a velocity and of the difference in it: of a product, a quotient, a kick, recording."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +73,8 @@ class Judgement:
         out: Lines = [self._answer(), plain(f"{self.path}: {frames} of {self.scene}, {self._share()}", "dim")]
         if failed:
             cause, _, remedy = checks.cause_of(self.verdicts).partition(". What to do: ")
-            out += [plain(f"Diagnosis: {cause[:1].upper()}{cause[1:].rstrip('.')}.")] if cause else []
+            cause = cause or "no reason that is known here"
+            out += [plain(f"Diagnosis: {cause[:1].upper()}{cause[1:].rstrip('.')}.")]
             out += [plain(f"Do: {remedy[:1].upper()}{remedy[1:].rstrip('.')}.")] if remedy else []
         out += [plain(f"Note: {note}", "dim") for note in self.notes]
         if verdicts:
@@ -119,11 +125,35 @@ class Judgement:
         return [table(titles, rows, left=titles[:3], prose="why"), *left_out(others, "Not applicable:")]
 
 
+def _shown(path: Path, states: States, scene: Scene) -> schemes.Scheme:
+    """The one scheme that the states of a file show.  StoreError where they show several, or none."""
+    schemes.bring(schemes.UNKNOWN)
+    judged, run, _, _ = as_trajectory(path, states, scene, schemes.UNKNOWN.name)
+    found = scenes.of_scene(judged, run)
+    if found.scheme is None or not found.fits:
+        raise StoreError(f"{path}: {found.statement}; state by --scheme what it should be")
+    return schemes.scheme(found.scheme)
+
+
+def _are_differences(scene: Scene, run: Trajectory) -> bool:
+    """Whether velocities are differences of the positions over a step or two, or with half a kick, and every
+    step is right to what those keep."""
+    half = run.arithmetic.recorded(scene.m, run.step, False)[1]
+    for n, kick in ((1, 0.0), (2, 0.0), (1, 0.5)) if run.every == 1 else ():
+        q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
+        made = scene.m * (run.q[n:] - run.q[:-n]) / (n * run.step)
+        off = np.abs(p - made - kick * run.step * scene.system.force(q, p)) - half / n
+        if np.all(off <= DIFFERENCE_ROUNDINGS * run.arithmetic.state * (np.abs(p) + np.abs(made))):
+            declared = checks.Case(trajectory=replace(run, rebuilds_velocity=True), scene=scene)
+            return checks.step_defect(declared).passed is True
+    return False
+
+
 def judge(
     path: Path,
     *,
     scene: str | Scene,
-    scheme: str,
+    scheme: str | None = None,
     columns: Sequence[str] = (),
     step: float | None = None,
     trajectory: str | None = None,
@@ -133,16 +163,21 @@ def judge(
 ) -> Judgement:
     """Verdicts on the trajectory of a file.
 
+    Without a `scheme` it is judged by the one that its states show.
     `differences` says that its velocities are differences of positions, which round by eps q/h;
     `arithmetic` names a method whose program rounds as that of the file; without `partial` a file that covers
     a part of the scene's steps does not pass.  SpringcheckError where it is unreadable or not of the scene.
     """
     found = load_scene(scene) if isinstance(scene, str) else scene
-    if scheme not in schemes.known():
+    if scheme is not None and scheme not in schemes.known():
         engines.names()  # those that are not asked for have schemes of their own
-    known = schemes.scheme(scheme)
+    known = schemes.scheme(scheme) if scheme is not None else None
     states = states_in(path, columns, step, trajectory)
+    if known is None:
+        known = _shown(path, states, found)
     judged, run, notes, taken = as_trajectory(path, states, found, known.name)
+    if scheme is None:
+        notes += (f"its states show {known.title} ({known.name}), and it is judged by that",)
     if differences:
         run = replace(run, rebuilds_velocity=True)
         notes += ("velocities were judged as differences of positions, as stated",)
@@ -153,13 +188,15 @@ def judge(
         notes += (f"judged with the arithmetic of {arithmetic}, as stated: {str(how) or 'double'}",)
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
-        for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)
+        for v in checks.explained(judged, run, checks.judge(judged, run), scenes.diagnosis)
     ]
     if states.roundoff > 2.0**-53 or known.flow:
         verdicts.append(shown.other_scheme(judged, run, states))
     if arithmetic is None and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
         notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
     wrong = any(v.passed is False and v.check in checks.TELLING for v in verdicts)
+    if wrong and not run.rebuilds_velocity and _are_differences(judged, run):
+        notes += ("velocities are differences of the positions, which keep eps q/h of them: --differences",)
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
         verdicts=tuple(verdicts), steps=judged.steps, of_steps=found.steps, partial=partial,

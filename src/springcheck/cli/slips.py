@@ -47,8 +47,6 @@ class Parser(argparse.ArgumentParser):
             known = [word.strip(" '") for word in wrong[2].split(",")]
             kind = "command" if "run" in known or len(known) == 1 else "choice"
             message = f"{wrong[1]!r} is no {kind}{nearest(wrong[1], known)}; there are {', '.join(known)}"
-        if message.endswith("are required: --scheme"):
-            message += "; `springcheck identify FILE` says which one its states show"
         if lone := re.fullmatch(r"argument (?:\S*/)?(--[\w-]+): expected one argument", message):
             option = lone[1]
             message = f"{option}: a value is needed; write one that begins with - as {option}=-..."

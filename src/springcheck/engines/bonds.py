@@ -88,7 +88,7 @@ def rests(scene: Scene, label: Label) -> Floats:
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     found = scene.system.rest_positions
     if found is None or any(np.any(lengths(term, found)) for term in pairs):
-        raise MethodError(f"{label}: springs without a common rest bend under noise across the line")
+        raise MethodError(f"{label}: noise across the line needs springs with a common rest point")
     return found
 
 

@@ -180,7 +180,7 @@ def _unequal(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def _stages(a: Any, g: Any) -> tuple[Any, Any, Any, Any]:
-    """RK4 whose stages take g times their steps."""
+    """RK4 with the step of every stage multiplied by g."""
     x, y = 1 - g * a / 2 + g**3 * a * a / 24, 1 - g * g * a / 6
     return x, y, -a * y, x
 
@@ -280,9 +280,12 @@ FAULTS = (
     ),
 )  # fmt: skip
 
+BOTH = "write position and velocity of one step"
 VIEWS: tuple[tuple[int | str, str, str], ...] = (
-    (-1, "whose velocities are one step behind the positions", "write position and velocity of one step"),
-    (1, "whose velocities are one step ahead of the positions", "write position and velocity of one step"),
+    (-1, "whose velocities are one step behind the positions", BOTH),
+    (1, "whose velocities are one step ahead of the positions", BOTH),
+    ("half before", "whose velocities are half a step behind the positions", BOTH),
+    ("half after", "whose velocities are half a step ahead of the positions", BOTH),
     ("mean", "with velocities by central differences of the positions", "write the velocities of the scheme"),
     ("later", "with velocities that are the next displacement over the step",
      "write the velocities of the scheme"),

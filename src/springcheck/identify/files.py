@@ -10,18 +10,14 @@ from typing import Any
 import numpy as np
 
 from springcheck import formats, schemes, store
-from springcheck.bath import THERMOSTATS
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
 from springcheck.identify.circle import on_a_circle
 from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
-from springcheck.identify.result import UNTOLD, Identification
-from springcheck.identify.steps import seen_to_take
+from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
-from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
 
 MOST_FRAMES = 20_000
 """Most frames that are identified, from the first on: every step shows the scheme."""
@@ -92,14 +88,14 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
     last = 2 * found.fixed.v if found.fixed and np.ndim(found.fixed.v) else None
     if v is not None and found.units:
         v = v * _velocity_factor(found.units, notes)
-    chosen, remarks = _chosen(found.q[kept], speed[kept], notes)
+    which, remarks = chosen(found.q[kept], speed[kept], notes)
     if mass is not None and len(mass) != found.q.shape[1]:
         mass = np.repeat(mass, found.q.shape[1] // len(mass))
-    p, v = (None if x is None else x[kept][:, chosen] for x in (p, v))
+    p, v = (None if x is None else x[kept][:, which] for x in (p, v))
     return FileStates(
-        label=name, t=found.t[kept], q=found.q[kept][:, chosen], p=p, v=v, notes=remarks, whole=found.q[kept],
-        mass=None if mass is None else mass[chosen], roundoff=found.roundoff,
-        last=None if last is None else last[chosen],
+        label=name, t=found.t[kept], q=found.q[kept][:, which], p=p, v=v, notes=remarks, whole=found.q[kept],
+        mass=None if mass is None else mass[which], roundoff=found.roundoff,
+        last=None if last is None else last[which],
     )  # fmt: skip
 
 
@@ -138,69 +134,12 @@ def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:
     return 1.0
 
 
-def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str, ...]]:
+def chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str, ...]]:
     """Indices of the coordinates that move, `MOST_OSCILLATORS` at most, and notes with what is left out."""
     moving = np.flatnonzero((np.ptp(q, axis=0) > 0) | (np.ptp(p, axis=0) > 0))
     more = [f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
     chosen = moving[:MOST_OSCILLATORS] if len(moving) else np.arange(min(1, q.shape[1]))
     return np.asarray(chosen), (*notes, *(more if len(moving) > MOST_OSCILLATORS else []))
-
-
-def sentence(
-    run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0, few: bool = False,
-    damped: bool = True,
-) -> str:  # fmt: skip
-    """One sentence that identifies a trajectory around a frame, for a failed verdict; "" where the states
-    show nothing.  `stiffness` (n,) where each particle has a spring of its own; `few` if the steps are the
-    scheme's own but for a few, which no cause explains that acts in every step; `damped` if there may be
-    friction."""
-    chosen, _ = _chosen(run.q, run.p, [])
-    most = MOST_RANDOM if run.scheme in THERMOSTATS else MOST_FAILED
-    first = max(0, min(about - most // 2, len(run.t) - most))
-    frames = slice(first, first + most)
-    q, p = (x[frames, chosen] for x in (run.q, run.p))
-    k = None if stiffness is None else stiffness[chosen]
-    try:
-        found = identify_arrays(run.t[frames], q, p, mass=mass[chosen], stiffness=k)
-    except IdentificationError:
-        return ""
-    if run.scheme in THERMOSTATS:
-        # that it is random is no cause, nor which schemes it may be of where its own is one of them
-        names = {x.scheme for x in found.candidates}
-        other = bool(names) and (run.scheme not in names or bool(found.explanations))
-        return found.statement if other or any(x.local for x in found.explanations) else ""
-    if few and not any(x.local for x in found.explanations[:1]):
-        return ""
-    # that they are of the scheme which they failed to be is no cause, but that they are so in single may be
-    plain = found.precision in ("double", UNTOLD) or not run.arithmetic.is_double
-    if not (found.fits and run.scheme in (found.scheme, *found.aliases)):
-        of = f"; frames are counted from frame {first} of the run" * (
-            first > 0 and "frame" in found.statement
-        )
-        return f"{found.statement}{of}"
-    # the exact flow of a frame is that of its steps
-    if found.stride not in (None, run.every) and not schemes.scheme(run.scheme).flow:
-        return f"{found.statement}, of {found.step:.9g} and not of {run.step:.9g}"
-    rates = [x for one in found.candidates if one.law and one.scheme == found.scheme for x in one.friction]
-    if rates and not damped:
-        low, high = f"{min(rates):.3g}", f"{max(rates):.3g}"
-        size = low if low == high else f"{low} to {high}"
-        return f"{found.statement}; its c/m is {size}, and the scene has none"
-    return "" if plain else found.statement
-
-
-def shown(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
-    """One sentence that identifies a run around a frame, `few` as in `sentence`; "" where none is known."""
-    taken = "" if few else seen_to_take(scene, run, about)
-    if not scene.system.is_linear:
-        return taken
-    alone = scene.system.is_separate
-    k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
-    said = sentence(run, scene.m, k, about=about, few=few, damped=scene.system.is_damped)
-    # springs couple the particles of a scene that has them
-    coupled = not alone and said.startswith("The oscillators are coupled")
-    own = taken.rpartition(" of ")[2].casefold()
-    return said if said.casefold().startswith(own) and not coupled else taken
 
 
 def titled(file: Path | str, label: str) -> str:

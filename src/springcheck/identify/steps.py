@@ -32,6 +32,10 @@ STEPS, MOST_STEPS = 24, 100
 """Recorded frames that are compared, and most steps from one to the next."""
 
 
+FIRST = 3
+"""Frames by which most schemes are excluded before the others are compared."""
+
+
 def _mistake(text: str, **step: Any) -> Scheme:
     return Scheme(name=text, title=text, order=0, limit=0.0, symplectic=False, **step)
 
@@ -67,6 +71,8 @@ def takers(
     size = [np.max(np.abs(x), axis=1, keepdims=True) for x in end]
     found = []
     for name in names:
+        if len(q) > FIRST and not takers([name], scene, h, q[:FIRST], p[:FIRST], least, every=every):
+            continue
         whole, half = (Law(scheme=WRONG.get(name) or scheme(name), scene=scene, h=h / n) for n in (1, 2))
         once = twice = start
         with np.errstate(all="ignore"):
@@ -155,19 +161,6 @@ def _unit(x: Floats, steps: Integers, roundoff: float, least: float) -> Floats:
     return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
 
 
-def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
-    """One sentence on the schemes of the catalogue that take the recorded steps around a frame; "" where none
-    does, and where frames are more than `MOST_STEPS` apart."""
-    first = max(0, min(about - STEPS // 2, len(run.t) - STEPS))
-    found = _taking(scene, run, slice(first, first + STEPS + 1))
-    # that steps which failed are nearly the scheme's own is no cause
-    titles = [title(name) for name in found if run.scheme not in found]
-    if titles and titles[0] in WRONG:
-        return titles[0]
-    what = "step recorded there is that" if run.every == 1 else f"frame there follows by {run.every} steps"
-    return f"Every {what} of {either(titles)}" if titles else ""
-
-
 def _taking(scene: Scene, run: Trajectory, frames: slice, least: float = 2.0**-49) -> tuple[str, ...]:
     """Schemes and mistakes that take each of these frames to the next."""
     if run.every > MOST_STEPS:
@@ -200,7 +193,7 @@ def on_scene(scene: Scene, run: Trajectory, notes: tuple[str, ...] = ()) -> Iden
             whose = either([title(name) for name in some])
             cause = f"The first steps are those of {whose} with the force of {scene.name}, later ones are not"
         remedy = "look at the scene's numbers; `springcheck judge` says where steps depart from a scheme"
-        return nothing([Explanation(cause, remedy)], scene.n, notes=notes)
+        return nothing([Explanation(cause, remedy, shown=bool(some))], scene.n, notes=notes)
     if found[0] in WRONG:
         because = Explanation(f"{found[0]}{steps}", WRONG_REMEDIES.get(found[0], COMPARE), local=True)
         return nothing([because], scene.n, notes=notes)

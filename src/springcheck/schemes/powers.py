@@ -45,6 +45,10 @@ def rotation(matrices: Extended) -> Rotation:
     return Rotation(determinant, angle, growth, sign, near)
 
 
+NO_AREA = 2.0**-56
+"""Error of a determinant of 1 from which a growth by it would be wrong in the digits of a double."""
+
+
 def propagate(
     matrices: Extended, y: Extended, v: Extended, steps: Integers, *, area_preserving: bool
 ) -> tuple[Extended, Extended]:
@@ -62,6 +66,9 @@ def propagate(
     sign = np.where(np.asarray(steps)[:, None] % 2 == 1, turn.sign, 1)
     x, g = turn.near, turn.growth
     with np.errstate(over="ignore", invalid="ignore"):
+        if area_preserving and np.any(off := (g != 0) & (np.abs(turn.determinant - 1) > NO_AREA)):
+            # of large elements it is a difference without digits, but known to be 1
+            g = np.where(off, np.arcsinh(np.sinh(g) * np.sqrt(turn.determinant)), g)
         turning, growing = x != 0, g != 0
         cosine = np.where(turning, np.cos(x), np.cosh(g))
         sine = np.where(turning, np.sin(np.where(turning, x, 1)), np.sinh(np.where(growing, g, 1)))

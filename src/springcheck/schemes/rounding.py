@@ -229,7 +229,7 @@ def _product(matrix: Reals, x: Reals) -> Reals:
 
 
 def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: of a force 4, a kick 2, a drift 3, in and out 4."""
+    """Roundings on the longest path through one step: force 4, kick 2, drift 3, in and out 4."""
     if scheme.stages:
         return 4 + sum(kind.roundings for kind in scheme.kinds)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)

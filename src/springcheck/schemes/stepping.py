@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from springcheck.physics.arrays import Floats, Force, Reals
+from springcheck.physics.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Acting, Setting
 
@@ -127,12 +127,12 @@ class OfLast(Generic[Made]):
     """What is made of a stiffness (n, n) and a factor (n,), kept for the two that were asked for last: of a
     linear scene all steps have the same."""
 
-    def __init__(self, make: Callable[[Any, Floats], Made]) -> None:
+    def __init__(self, make: Callable[[Any, Reals], Made]) -> None:
         self._make = make
-        self._last: list[tuple[Any, Floats, Made]] = []
+        self._last: list[tuple[Any, Reals, Made]] = []
 
     def __call__(self, stiffness: Any, factor: Reals) -> Made:
-        of = np.array(np.broadcast_to(factor, stiffness.shape[-1:]), np.float64)
+        of = np.array(np.broadcast_to(factor, stiffness.shape[-1:]))
         for known, its, made in self._last:
             if known is stiffness and np.array_equal(its, of):
                 return made
@@ -142,7 +142,7 @@ class OfLast(Generic[Made]):
 
 
 @OfLast
-def _inverse(stiffness: Reals, factor: Floats) -> Callable[[Reals], Reals]:
+def _inverse(stiffness: Reals, factor: Reals) -> Callable[[Reals], Reals]:
     """x (..., n) -> (1 + factor K)**-1 x in double precision."""
     if len(factor) > MOST_INVERTED:
         from scipy.sparse import csr_array
@@ -219,8 +219,8 @@ MOST_NEWTON_STEPS = 50
 def _braked(
     at: Reals, q: Reals, p: Reals, x: Any, m: Reals, force: Force, rate: Callable[..., Any]
 ) -> tuple[Reals, Reals, Reals]:
-    """Residual of a stage's end `at`, times 1 + x rate, its derivative but for the stiffness, and the size of
-    what cancels in it, (..., n)."""
+    """Residual of an implicit stage that ends in `at`, its derivative without the stiffness, and the size of
+    the terms that cancel in it, (..., n)."""
     braked, bent, lost = rate(at, q)
     slowed, moved, kick = 1 + x * braked, at - q, x * force(at, np.zeros_like(p))
     lacks = moved * slowed + x * (lost - (p + kick) / m)

@@ -32,7 +32,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
         raise StoreError(f"cannot write {out}: there is no folder {out.absolute().parent}")
     if out.suffix != ".h5md":
         raise StoreError(
-            f"{out}: the name must end in .h5md, readers go by it; .csv and .npz are written in Python, by "
+            f"{out}: the name must end in .h5md; for .csv and .npz use Python: "
             f"springcheck.read({str(path)!r})[{label!r}].save({str(out)!r})"
         )
     source = reading.source_of(path, label)

@@ -36,9 +36,8 @@ _OWN = tuple(name for name in _VERDICT if not name.startswith("sees_"))
 class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
-    Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one), `auxiliary` those next to the signal, `log` those of signal and axes
-    that want a logarithmic scale.
+    They hold numbers, booleans or text; `units` has the unit of a column.  A viewer draws the column
+    `signal` over `axes` ("." for an index), with the columns `auxiliary`; those in `log` logarithmically.
     """
 
     name: str

@@ -170,7 +170,7 @@ class Path:
             expected = self.calls * float(end) / done
             if self.calls > (TRIAL_CALLS if expected > UNEVEN * limit else limit):
                 raise NoReferenceError(
-                    f"it needs about {expected:.1g} calls of the force, and at most {limit} are made"
+                    f"it needs about {expected:.1g} force evaluations; the limit is {limit}"
                 )
             self._step()
 

@@ -81,7 +81,7 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
     try:
         data = tomllib.loads(text)
     except RecursionError as error:
-        raise SceneError(f"{where}: not valid as a scene: it is nested too deep") from error
+        raise SceneError(f"{where}: not a scene: it is nested too deep") from error
     except ValueError as error:
         # an integer of thousands of digits raises another ValueError than tomllib's
         raise SceneError(

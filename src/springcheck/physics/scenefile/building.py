@@ -206,7 +206,7 @@ def _distance(term: Any, bodies: Bodies, key: str, j: int, row: Any) -> Rows:
     """A row for each axis of the two particles, or of a particle and a fixed point."""
     where = f"{key}[{j}]"
     if bodies.name == "inductor":
-        raise MistakeError(f"{where}: a {key} joins particles")
+        raise MistakeError(f"{where}: a {key} joins two particles; circuits have none")
     values, found = _values(term.columns[:-1], row), bodies.along(where, row)
     wall = row.wall if isinstance(row.wall, tuple) else (row.wall,) * (1 if row.wall else len(found))
     if len(wall) != len(found):

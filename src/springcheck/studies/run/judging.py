@@ -85,13 +85,13 @@ def judge(
     if stride > 1:
         worst = {name: _bridged(mine, verdicts[name], frames) for name, mine in worst.items()}
     if failed:
-        from springcheck.identify import files
+        from springcheck.identify import scenes
 
         # the cause goes with a verdict that fails among those of all methods as well
         fair = iter(checks.shared([v for mine in worst.values() for v in mine]))
         worst = {name: [next(fair) for _ in mine] for name, mine in worst.items()}
         for name, piece in failed.items():
-            worst[name] = checks.explained(scene, piece, worst[name], files.shown)
+            worst[name] = checks.explained(scene, piece, worst[name], scenes.diagnosis)
     return Report(
         scene=scene,
         path=path,
