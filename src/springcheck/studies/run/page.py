@@ -80,7 +80,7 @@ def of_runs(
         firsts = [group.members[0].label for group in parts.groups[:POSITIONS_IN_BATH]]
         few = Runs(scene, {label: followed[label] for label in firsts}, failed)
         out = [
-            portraits.clouds(usable, shown[0], scene.thermal),
+            portraits.clouds(usable, shown[0]),
             portraits.positions(few, shown, None, usable),
         ]
     else:
@@ -93,7 +93,7 @@ def of_runs(
         return [replace(bank, name=f"{bank.name}-particle-{particle}") for bank in out]
     if scene.bath is not None:
         heated = heated or [heated_of(scene, [run]) for run in usable.every]
-        return [*out, energies.means(usable, scene.thermal), *_temperatures(usable, heated)]
+        return [*out, *_temperatures(usable, heated)]
     # of a bound pair its bond is shown, and no path
     if shown[0].what != "length" and (planes := paths(scene)):
         out.append(portraits.phase_portraits(parts, planes, truth, said))
