@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import identify_bugs as bugs
 import identify_corpus as corpus
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification
@@ -71,3 +72,29 @@ def test_clocks_are_those_of_programs() -> None:
     for _ in range(30):
         t.append(t[-1] + 0.1)
     assert np.array_equal(corpus.clock(kind="added", h=0.1, frames=11, every=3), t[::3])
+
+
+@pytest.mark.parametrize("bug", bugs.chosen(0.1), ids=lambda bug: bug.name)
+def test_bugs_of_public_threads_are_told_nothing_false(bug: bugs.Bug) -> None:
+    assert bugs.judged(bug, *bugs.said(bug)) != "FALSE"
+
+
+def test_bugs_are_forty_and_a_false_sentence_is_seen() -> None:
+    assert len({bug.name for bug in bugs.BUGS}) == len({bug.source for bug in bugs.BUGS}) == 40
+    bug = next(x for x in bugs.BUGS if x.name == "no reaction")
+    assert bugs.judged(bug, "The reaction is left out", False) == "right"
+    assert bugs.judged(bug, "Velocity Verlet", True) == "FALSE"
+    assert bugs.judged(bug, "Noise: it is irregular", False) == "FALSE"
+    assert bugs.judged(bug, "No known cause", False) == "short"
+
+
+MENDED = {
+    "the time is doubled", "a limit after the position has moved", "the reaction with the wrong sign",
+    "no reaction", "0*5 for 0.5", "another integrator in the middle", "time in single precision",
+    "stages without h", "a h for a h**2",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("bug", [x for x in bugs.BUGS if x.name in MENDED], ids=lambda bug: bug.name)
+def test_the_cause_is_stated(bug: bugs.Bug) -> None:
+    assert bugs.judged(bug, *bugs.said(bug)) == "right"

@@ -188,7 +188,7 @@ def not_opposite(record: Record, each: list[int], *, surely: bool = False) -> Ex
     if surely and not missing and force[a, b] * force[b, a] > 0:
         return None
     how = "has the wrong sign" if abs(force[a, b] + force[b, a]) <= error else "is not equal to it"
-    how = "is missing" if missing else how
+    how = "is left out" if missing else how
     cause = f"The forces between coordinates {each[a]} and {each[b]} are not opposite: the reaction {how}"
     return Explanation(cause, "give the two particles forces that are equal and opposite", local=True)
 
