@@ -213,8 +213,9 @@ def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -
 
 
 def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Runs) -> Bank:
-    """Positions over time: a row for each view; of many periods the first and the last.  `whole`: the runs
-    from start to end, of which errors are given."""
+    """Positions over time, a row for each view; of many periods the first and the last.
+
+    `whole`: the complete runs, whose errors the title states."""
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
