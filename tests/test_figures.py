@@ -520,3 +520,8 @@ def test_energies_beyond_double_precision_are_drawn_without_a_warning() -> None:
     scene = scenefile.load_scene("multiple-time-steps")
     found = runs(scene, "own:velocity-verlet")
     assert of_runs(scene, found, found)
+
+
+def test_a_title_without_names_drops_brackets_within_brackets() -> None:
+    said = "states off by at most 4e-07 (classical Runge-Kutta (RK4)) to 39 % (explicit Euler)"
+    assert overlay.short(said) == "States off by at most 4e-07 to 39 %"
