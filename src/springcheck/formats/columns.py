@@ -54,6 +54,7 @@ SLOPE = 0.2
 
 ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Euler: record velocities too"
 """Note on a file that cannot distinguish schemes which share one recurrence of the positions."""
+BARE = "columns without names were taken as t, q and v: the last is the rate of the one before"
 ANEW = "name all columns, as --columns t,q,v; - leaves one out, as -,t,q,v"
 
 

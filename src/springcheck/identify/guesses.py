@@ -53,7 +53,7 @@ def _roots(found: Map, strides: Sequence[int], exact: bool) -> list[tuple[int, i
 
 
 def guesses(table: Table, found: Map, strides: Sequence[int]) -> tuple[Any, Floats]:
-    """First guesses: the row (c,) of each, and (stride, turns, a, g), (c, 4)."""
+    """First guesses: the catalogue row of each (c,), and its stride, turns, a and g (c, 4)."""
     every = np.array(_roots(found, strides, False)).reshape(-1, 4)
     rows: list[Any] = []
     out: list[Any] = []
