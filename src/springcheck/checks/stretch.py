@@ -59,7 +59,7 @@ WIDENED = 3.32
 """Factor by which an estimate from `SAMPLES` is below the standard deviation once in a million:
 chi-squared."""
 
-NUMBERS = 1 << 20
+NUMBERS = 1 << 18
 """Entries of states and tangent maps that are in memory at a time: 16 MB, and a few times as much for
 temporaries."""
 
