@@ -154,4 +154,35 @@ def test_damping_by_a_factor_of_each_frame_shows_in_positions() -> None:
         rows.append(x)
         x, before = x + 0.9 * (x - before) - H * H * K / M * x, x
     said = identify(H * np.arange(200), np.array(rows), mass=M, stiffness=K, friction=0.23).statement
-    assert "friction 20 to 21.3 times the stated" in said, said
+    assert "times the stated (20 to 21.3 by where it acts)" in said, said
+
+
+@pytest.mark.parametrize(("late", "word"), [(-0.5, "half a step behind"), (0.5, "half a step ahead")])
+def test_velocities_of_rk4_half_a_step_off_are_told(late: float, word: str) -> None:
+    t, q, v = loop(rk4, np.full(200, H))
+    said = identify(t, q, v=v - late * H * K / M * q, mass=M, stiffness=K).statement
+    assert word in said, said
+
+
+def test_a_drift_by_another_mass_is_told_with_it() -> None:
+    def step(h: float, q: float, v: float) -> tuple[float, float]:
+        v = v - h * K / M * q
+        return q + h * v * M / 3.1, v
+
+    t, q, v = loop(step, np.full(200, H))
+    assert "moved by p / 3.1, where the mass is 2.3" in identify(t, q, v=v, mass=M, stiffness=K).statement
+
+
+def test_a_step_that_takes_the_size_of_a_negative_step_is_told() -> None:
+    t, q, v = loop(verlet, np.full(200, H))
+    assert "each step is |h|, not h" in identify(-t, q, v=v, mass=M, stiffness=K).statement
+
+
+def test_a_damped_motion_of_sixteen_steps_to_a_frame_is_named_without_its_step() -> None:
+    def step(h: float, q: float, v: float) -> tuple[float, float]:
+        q, v = verlet(h, q, v)
+        return q, v * np.exp(-0.35 * h)
+
+    t, q, v = loop(step, np.full(1600, H))
+    found = identify(t[::16], q[::16], v=v[::16], mass=M, stiffness=K)
+    assert (found.scheme, found.stride) == ("velocity-verlet", 16), found

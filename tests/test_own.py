@@ -348,14 +348,42 @@ def test_a_slope_is_compiled_where_a_run_is_long_or_its_note_says_why_not(
     assert not own.compiled
     assert "opaque is not compiled (numba" in own.note
     assert "\n" not in own.note
+    monkeypatch.setattr(Opaque, "slope", "no function")
+    assert laws.why_not(type("Other", (Opaque,), {})).startswith("numba: ")
+    monkeypatch.undo()
     run = driver.run(replace(what, steps=10**5, every=10**4), "own:rk4")
     assert run.outcome.message == own.note
-    # a compiled slope is compared with NumPy's before it is used
-    right = laws._slope(LennardJones)[0]
-    monkeypatch.setattr(laws, "_slope", lambda kind: (lambda *given: (1 + 1e-13) * right(*given), ""))
-    own = simulation.prepare(replace(distances(10**6), terms=distances(1).terms[1:2]), "rk4", 0.01)
+
+
+@pytest.mark.parametrize("changed", ["slope", "pull", "kind"])
+def test_a_term_whose_force_is_not_that_of_its_slope_is_not_compiled(
+    changed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("numba")
+
+    @dataclass(frozen=True, kw_only=True, eq=False)
+    class Odd(Sextic):
+        key: ClassVar[str] = "odd"
+        kind: ClassVar[Any] = "friction" if changed == "kind" else "potential"
+
+        def add_force(self, q: Any, v: Any, out: Any) -> None:
+            Term.add_force(self, q, v, out)
+            out[..., self.i] -= 1e-9 * v[..., self.i] * (changed == "pull")
+
+    if changed == "slope":
+        right = laws._slope(Odd)[0]
+        wrong = compiled_slope(lambda u, x, s: (1 + 1e-12) * right(u, x, s))
+        monkeypatch.setattr(laws, "_slope", lambda kind: (wrong, ""))
+    what = scene(1.7, 0.3, 0.2, wall(2.3), Odd(i=[0], c=[0.7], at=[0.1]), steps=10**6)
+    own = simulation.prepare(what, "velocity-verlet", 0.1)
     assert not own.compiled
-    assert "another function" in own.note
+    assert "odd is not compiled" in own.note
+
+
+def compiled_slope(function: Any) -> Any:
+    import numba
+
+    return numba.njit(function)
 
 
 def test_without_numba_a_slope_is_numpys(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -351,6 +351,8 @@ def test_a_file_as_people_have_it_is_read(
     assert found.t == pytest.approx(T, rel=1e-15)
     assert found.v is not None
     assert (found.q[:, 0].tolist(), found.v[:, 0].tolist()) == (Q.tolist(), V.tolist())
+    bare = "=" not in text and text.lstrip("[ ")[0].isdigit() and not columns
+    assert any("without names" in note for note in found.notes) is bare
 
 
 @pytest.mark.parametrize("clock", [{"t": T}, {"dt": 0.1}])
@@ -366,6 +368,7 @@ def test_positions_and_velocities_in_one_array_are_those_of_scipy(
     assert found.v is not None
     assert np.array_equal(np.hstack([found.q, found.v]).T, of)
     assert (found.q.shape[1], found.t[3]) == (n, pytest.approx(T[3]))
+    assert any("y was taken as positions" in note for note in found.notes)
     # two coordinates, of which none is the rate of the other
     np.savez("x.npz", y=np.stack([Q, Q2]), t=T)
     assert read("x.npz").v is None
@@ -418,6 +421,9 @@ def test_energies_alone_are_said_to_be_that(head: str) -> None:
     Path("x.csv").write_text(table(*many, head=head))
     with pytest.raises(StoreError, match=r"energies alone.*changes by .* of its size.*record positions"):
         read("x.csv")
+    np.savez("x.npz", t=T, E_tot=np.stack([Q, V], axis=1))
+    with pytest.raises(StoreError, match=r"energies alone.*E_tot changes by"):
+        read("x.npz")
 
 
 def test_coordinates_as_gromacs_writes_them_are_those_of_its_atoms() -> None:

@@ -43,33 +43,15 @@ from springcheck.studies.precision.points import CUT_OFF, POINTS
 
 LABELS = [f"own:method-{i}" for i in range(6)]
 PHASES = ("part", "collection")
-CALLS = {
-    "open",
-    "write",
-    "fsync",
-    "replace",
-    "unlink",
-    "rmdir",
-    "posix_fallocate",
-    "mkdir",
-    "truncate",
-}
+CALLS = {"open", "write", "fsync", "replace", "unlink", "rmdir", "posix_fallocate", "mkdir", "truncate"}
 
 
 def scene(frames: int) -> Scene:
     """Three particles of unequal mass."""
     m = np.array([3.7, 0.4, 1.9])
     return Scene(
-        name="kill",
-        title="",
-        source="",
-        m=m,
-        q=m * 0,
-        p=m,
-        terms=(),
-        step=0.1,
-        steps=frames - 1,
-    )
+        name="kill", title="", source="", m=m, q=m * 0, p=m, terms=(), step=0.1, steps=frames - 1
+    )  # fmt: skip
 
 
 def table(name: str) -> store.Table:

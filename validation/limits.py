@@ -105,6 +105,7 @@ def main() -> int:
     off = abs(first(lambda h: growth(respa(h)), 0.4, 800) / ours - 1)
     wrong += not off < ALLOWED
     print(f"{'respa8 on ' + scene.name:32}{rounded_down(ours):>14}  differs by {float(off):.0e}")
+    print(f"{wrong} differences above {ALLOWED:.0e}")
     return int(bool(wrong))
 
 

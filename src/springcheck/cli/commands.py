@@ -61,7 +61,7 @@ def _plot(options: Namespace) -> int:
     doubts = output.doubts(options.file) if ours else []
     with output.warned(options.file, doubts):
         if ours and options.trajectory is None:
-            written, notes = drawing.draw(path, into, particle=options.particle)
+            written, notes = drawing.draw(path, into, particle=options.particle, x=options.x, y=options.y)
         else:
             which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
             written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
@@ -318,6 +318,8 @@ COMMANDS = (
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         argument("--particle", type=int, metavar="I",
                  help="draw this particle only, 0 or more (default: all)"),
+        argument("--x", metavar="NAME", help="of a study of precision: time, calls, or an error"),
+        argument("--y", metavar="NAME", help="the error along y: largest, end, energy or phase"),
         _NAMES,
         _STEPS,
         _GROUP,

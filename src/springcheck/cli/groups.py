@@ -14,12 +14,12 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
         "spring --temperature 300K --seed 1",
         "spring --stepper mine.py:step",
     ),
-    "precision": ("spring --budget 20 --method own:rk4",),
+    "precision": ("spring", "spring --budget 20 --metric energy", "spring --long 1e5 --step 0.3"),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),
     "sampling": ("--method 'own:*' --method 'openmm:*'",),
     "inspect": ("spring.h5 --verdicts", "spring.h5 --trajectory own:euler --rows 5"),
-    "plot": ("spring.h5 -o figures", "orbit.csv"),
+    "plot": ("spring.h5 -o figures", "spring-precision.h5 --x calls --y phase", "orbit.csv"),
     "report": ("spring.h5 -o spring.html",),
     "show": ("spring -o my.toml",),
     "explain": ("velocity-verlet", "step-defect", "openmm:verlet"),
@@ -44,7 +44,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "how much is measured": (
         "--thorough", "--partial", "--budget", "--metric", "--long", "--quick", "--workers", "--cluster",
     ),
-    "figures": ("--particle",),
+    "figures": ("--particle", "--x", "--y"),
     "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--left-out", "--rows"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
 }  # fmt: skip

@@ -40,9 +40,8 @@ ORBIT_WORDS = {
 }  # fmt: skip
 """What the energy may do over a run, of one scheme and of several."""
 
-CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
-"""Fraction of an energy, or logarithm of its ratio to the start's, that counts as a change; fraction of a
-change that is uniform, unlike an oscillation; and schemes that a title names."""
+CHANGED = 0.05
+"""Fraction of an energy that counts as a change."""
 
 SEEN = 0.01
 """Fraction of an energy from which on a linear axis shows a change."""
@@ -52,9 +51,6 @@ FLAT = 1e-3
 
 FLOOR, ALL_ROUNDED = 2.0**-53, 2.0**-44
 """Relative differences that are drawn at the lower edge if below, and that count as roundings if below."""
-
-EMPTY = 1e3
-"""Factor between the errors of some and all others from which on both have a chart of their own."""
 
 
 def energy(runs: Runs, exact: Exact) -> Bank:
@@ -90,7 +86,12 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     differences = {run.label: off(run) for run in runs.every}
     what = "exact" if changes else "initial"
     lower = decades(runs, differences, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
-    said = _said(runs, found, differences) if scene.system.keeps_energy or changes else ""
+    said = ""
+    if scene.system.keeps_energy or changes:
+        largest = _largest(runs, differences)
+        said = extremes(largest, "energy off by at most {}", beyond=MOST_DRAWN)
+        if scene.system.keeps_energy and (most := max(largest.values())) <= ALL_ROUNDED:
+            said = f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
     # coinciding lines are better shown by their differences
     flat = lower and scene.system.keeps_energy and max(map(np.max, differences.values())) < FLAT * ys.half
     charts = lower if flat else [upper, *lower]
@@ -103,42 +104,9 @@ def _energies(scene: Scene, q: Reals, p: Reals, unit: float = 1.0) -> Floats:
         return np.asarray(scene.system.energy(q, p), np.float64) / unit
 
 
-def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
-    """Who gains or loses energy in every step alike, and how far the others are off."""
-    largest = _largest(runs, differences)
-    said: list[str] = []
-    if runs.scene.system.keeps_energy:
-        if max(largest.values()) <= ALL_ROUNDED:
-            most = max(largest.values())
-            return f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
-        for group in runs.groups:
-            each = steady(found[group.members[0].label], group.members[0].every)
-            if each and not group.failed and len(said) < FINDINGS_SAID:
-                percent = float(f"{100 * abs(each):.2g}")
-                said.append(f"{group.title} {'gains' if each > 0 else 'loses'} {percent:g} % a step")
-                del largest[group.title]
-    if largest:
-        whose = "energy of all others" if said else "energy"
-        said.append(extremes(largest, f"{whose} off by at most {{}}", beyond=LARGE_ENERGY))
-    return "; ".join(said)
-
-
 def _largest(runs: Runs, found: Mapping[str, Floats]) -> dict[str, float]:
     """The largest number of any engine of each scheme."""
     return {x.title: max(float(np.max(found[run.label])) for run in x.members) for x in runs.groups}
-
-
-def steady(energies: Floats, every: int) -> float:
-    """Relative change of an energy that is the same in every step; 0 where it oscillates or stays."""
-    if not (np.isfinite(energies).all() and np.min(energies) > 0 and len(energies) > 4):
-        return 0.0
-    y, n = np.log(energies), np.arange(len(energies))
-    if abs(y[-1] - y[0]) <= CHANGED:
-        return 0.0
-    rate, begin = np.polyfit(n, y, 1)
-    if np.var(y - rate * n - begin) > (1 - EVENLY) * np.var(y):
-        return 0.0
-    return float(np.expm1(rate / every))
 
 
 def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
@@ -196,17 +164,13 @@ def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
 def decades(
     runs: Runs, found: Mapping[str, Floats], name: str, title: str, *, known: bool = False
 ) -> list[Chart]:
-    """Differences (f,) of each run on logarithmic scales: those far smaller than all others apart, so that no
-    decade is empty; none where all are roundings.  `known`: the scale follows from the scene, and 1 is as
-    large as the motion itself."""
+    """Differences (f,) of each run on a logarithmic scale; none where all are roundings.  `known`: the scale
+    follows from the scene, and 1 is as large as the motion itself."""
     finite = {label: np.where(np.isfinite(x), x, np.inf) for label, x in found.items()}
     if max((float(np.max(x)) for x in finite.values()), default=0.0) <= ALL_ROUNDED and not known:
         return []
     one = [Rule(axis="y", at=1.0, name="as large as the motion", look="one")] if known else []
-    return [
-        _panel(runs, {label: x for label, x in finite.items() if label in labels}, name, title, one)
-        for labels in _apart(finite)
-    ]
+    return [_panel(runs, finite, name, title, one)]
 
 
 def _panel(runs: Runs, found: Mapping[str, Floats], name: str, title: str, rules: Sequence[Rule]) -> Chart:
@@ -241,25 +205,6 @@ def _panel(runs: Runs, found: Mapping[str, Floats], name: str, title: str, rules
     return naming.at_ends(chart, height=1.4 * NAME_HIGH)
 
 
-def _apart(found: Mapping[str, Floats]) -> list[set[str]]:
-    """Labels by the decades that they fill, the largest first; apart where decades between are empty."""
-    spans = []
-    for label, x in found.items():
-        some = x[1:][(x[1:] > 0) & np.isfinite(x[1:])]
-        low, high = np.quantile(some, [0.1, 1.0]) if len(some) else (FLOOR, FLOOR)
-        # diverging methods are placed with the largest of the others
-        spans.append((min(float(low), 1.0), min(float(high), MOST_DRAWN), label))
-    sets: list[set[str]] = []
-    lowest = np.inf
-    for low, high, label in sorted(spans, key=lambda x: -x[1]):
-        if high * EMPTY < lowest:
-            sets.append(set())
-            lowest = np.inf
-        lowest = min(lowest, max(low, FLOOR))
-        (sets or [set()])[-1].add(label)
-    return sets
-
-
 def error(runs: Runs, exact: Exact) -> Bank:
     """Distance from the exact solution over time, on a logarithmic scale."""
     found = {run.label: exact.error(run) for run in runs.every}
@@ -270,29 +215,3 @@ def error(runs: Runs, exact: Exact) -> Bank:
     far = MOST_DRAWN * exact.reach(runs.longest)
     said = extremes(some, "off the exact solution by at most {}", beyond=far) if some else "errors"
     return runs.bank("error", charts, said, (7.2, 4.2 if len(charts) == 1 else 2.6))
-
-
-def means(runs: Runs, thermal: float) -> Bank:
-    """The mean energy up to each time, over kT, of runs in a bath."""
-    found = {}
-    scene = runs.scene
-    for run in runs.every:
-        e = _energies(scene, run.q, run.p, thermal)
-        found[run.label] = np.cumsum(e) / np.arange(1, len(e) + 1)
-    ends = {group.title: float(found[group.members[0].label][-1]) for group in runs.groups}
-    usual = float(np.median(list(ends.values())))
-    near = [x for x in found.values() if abs(x[-1] - usual) <= 3 * abs(usual)]
-    later = [x[len(x) // 20 :] for x in near] or [np.array([usual])]
-    ys = frames.widened(min(map(np.min, later)), max(map(np.max, later)))
-    some = {name: x for name, x in ends.items() if np.isfinite(x)}
-    low, high = (f(some, key=lambda x: some[x]) for f in (min, max))
-    linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
-    equal = linear and ys.low < scene.n < ys.high
-    title, name = "Mean energy up to each time, over kT.", "mean energy so far / kT"
-    chart = runs.over_time(found, ys, title=title, name=name, alike=False)
-    if equal:
-        rule = Rule(axis="y", at=float(scene.n), look="here")
-        chart = replace(chart, rules=[rule], note=f"dotted: equipartition, {scene.n} kT")
-    said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"
-    said = f"mean energy {some[low]:.3g} kT ({low})" if low == high else said
-    return runs.bank("energy", [chart], said, (7.2, 4.2))

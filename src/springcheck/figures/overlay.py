@@ -5,6 +5,7 @@ Engines of one scheme that pass share a line; one that failed has its own, in re
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -207,7 +208,7 @@ def short(said: str) -> str:
         part = whole
         if not out and len(whole) > MOST_LETTERS:
             # without whose the numbers are
-            part = "".join(x.rpartition(")")[2] if i else x for i, x in enumerate(whole.split(" (")))
+            part = re.sub(r" \((?:[^()]|\([^()]*\))*\)", "", whole)
         longer = f"{out}; {part}" if out else part
         if len(longer) > MOST_LETTERS:
             break

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.figures import frames, looks, naming
-from springcheck.figures.charts import BEGIN, GUIDE, SEPARATRIX, Bank, Chart, Curve, Scale
+from springcheck.figures.charts import BEGIN, SEPARATRIX, Bank, Chart, Curve, Scale
 from springcheck.figures.frames import Frame
 from springcheck.figures.motion import Exact, Motion, periods, smooth
 from springcheck.figures.overlay import Runs, exact_curve, share
@@ -25,16 +25,11 @@ MANY_PERIODS, PERIODS_SHOWN = 14, 6
 CHORD = 0.015
 """Fraction of the axes by which lines between frames may miss the exact solution: beyond, frames are dots."""
 
-JUMP, MANY_POINTS, TO_AND_FRO = 0.3, 1000, 0.25
-"""Distance of two points, in half axes, that is a jump in a curve of many points; and the fraction of all
-frames from which on a run is taken to jump to and fro."""
+JUMP, MANY_POINTS = 0.3, 1000
+"""Distance of two points, in half axes, that is a jump in a curve of so many points."""
 
 STEEP, START_SHOWN = 30.0, 3.0
 """Reach, in medians, from which on a motion runs away; and what is shown of it, in reaches of its start."""
-
-STANDS, SOON = 0.02, 0.1
-"""Fraction of its displacement that is left where a motion has settled; and the fraction of the run within
-which that is early."""
 
 MOST_CLOUDS = 12
 """Most schemes in a bath that have a panel of their own."""
@@ -110,8 +105,8 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     )
 
 
-def clouds(runs: Runs, view: View, thermal: float) -> Bank:
-    """States in a bath: a panel for each scheme, with the ring on which the energy is kT above the least."""
+def clouds(runs: Runs, view: View) -> Bank:
+    """States in a bath: a panel for each scheme."""
     groups = runs.groups[:MOST_CLOUDS]
     picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
     # one that diverges sets the scale of none
@@ -121,7 +116,6 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
         frames.widened(*(float(f([f(one[j]) for one in usual or picked.values()])) for f in (np.min, np.max)))
         for j in (0, 1)
     )
-    ring = [Curve(name="H = kT", group=GUIDE, x=x, y=y) for x, y in view.ring(xs.low, xs.high, thermal)]
     charts = []
     for group in groups:
         curves = runs.curves(lambda run: picked[run.label], dots=True, groups=[group], alike=False)
@@ -131,13 +125,13 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
                 short=group.title,
                 x=xs.axis(view.x_name, view.x_unit),
                 y=ys.axis(view.y_name, view.y_unit),
-                curves=[*(replace(one, marks=False) for one in curves), *ring],
+                curves=[replace(one, marks=False) for one in curves],
             )
         )
     left = len(runs.groups) - len(groups)
     more = f"; {left} more are not drawn" if left else ""
     said = f"states by {len(runs.groups)} thermostat{'s' * (len(runs.groups) > 1)}"
-    said += ("; on the ring H = kT" if ring else "") + more
+    said += more
     said = _heading(f"phase portrait{_of(runs, [view])}", said)
     return runs.bank("phase-portrait", charts, said, (2.6, 2.4), columns=min(4, len(charts)))
 
@@ -166,12 +160,6 @@ def _parted(x: Floats, y: Floats, xs: Frame, ys: Frame) -> State:
     far = np.hypot(np.diff(x) / xs.half, np.diff(y) / ys.half) > JUMP
     at = (1 + np.flatnonzero(far)).tolist() if len(x) > MANY_POINTS else []
     return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
-
-
-def _swings(y: Floats, ys: Frame) -> bool:
-    """Whether frames jump to and fro, so that lines between them would fill the axes."""
-    d = np.diff(y)
-    return len(d) > 1 and bool(np.mean((d[1:] * d[:-1] < 0) & (np.abs(d[1:]) > JUMP * ys.half)) > TO_AND_FRO)
 
 
 def _meets(x: Floats, y: Floats, xs: Frame, ys: Frame) -> bool:
@@ -225,8 +213,9 @@ def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -
 
 
 def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Runs) -> Bank:
-    """Positions over time: a row for each view; of many periods the first and the last.  `whole`: the runs
-    from start to end, of which errors are given."""
+    """Positions over time, a row for each view; of many periods the first and the last.
+
+    `whole`: the complete runs, whose errors the title states."""
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
@@ -249,7 +238,7 @@ def _off(runs: Runs, view: View) -> str:
         with np.errstate(all="ignore"):
             each = [np.max(np.abs(x - true)) / (np.ptp(true) or 1.0) for x, true in both]
             found[group.title] = float(np.max(each))
-    return extremes(found, f"off the exact {view.what} by at most {{}} of its peak-to-peak range")
+    return extremes(found, f"{view.what} off by at most {{}} of its range")
 
 
 def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> str:
@@ -277,13 +266,6 @@ def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tupl
     return [(first, first + length), (last - length, last)][: 1 if runs.scene.bath else 2]
 
 
-def _settles(t: Floats, x: Floats) -> float:
-    """When a motion has settled, where that is soon; else its end."""
-    away = np.abs(x - x[-1]) > STANDS * np.ptp(x)
-    last = float(t[np.flatnonzero(away)[-1]]) if away.any() else float(t[-1])
-    return 3 * (last - float(t[0])) + float(t[0]) if last - t[0] < SOON * (t[-1] - t[0]) else float(t[-1])
-
-
 def _position(
     runs: Runs, view: View, truth: Motion | None, span: tuple[float, float], *, alone: bool
 ) -> Chart:
@@ -292,8 +274,6 @@ def _position(
     first = runs.every[0]
     steep = _steep(view.pick(first.q, first.p) if true is None else true) is not None
     ys = frames.frame(list(picked.values()), None if true is None else true[0])
-    if truth is not None and true is not None:
-        span = span[0], min(span[1], _settles(np.abs(truth[0]), true[0]))
     dy, unit_x = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.x_unit)
     of = np.abs if steep else np.asarray
 
@@ -310,10 +290,7 @@ def _position(
         y = ys.within(view.pick(fine[1], fine[2])[0])
         lines.append(exact_curve(fine[0][: len(y)], of(y)))
     dots = _chords(runs.longest, fine, view, ys)
-    curves = [
-        replace(one, line=False, dots=True) if _swings(np.asarray(one.y), ys) else one
-        for one in runs.curves(cut, dots=dots, faint=True)
-    ]
+    curves = runs.curves(cut, dots=dots, faint=True)
     if steep:
         inside = [np.abs(x) for x in picked.values() if ys.leaves(x) is None]
         least = min((float(np.min(x[x > 0], initial=ys.high)) for x in inside), default=ys.high / 10)

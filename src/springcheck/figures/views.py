@@ -101,20 +101,6 @@ class View:
                 out.append((x, np.sqrt(2 * self.mass * rest)))
         return out
 
-    def ring(self, low: float, high: float, height: float) -> list[State]:
-        """The curve on which the energy is this much above the minimum, where it closes within a range of
-        x."""
-        if self.potential is None:
-            return []
-        x = np.linspace(low, high, 2001)
-        with np.errstate(all="ignore"):
-            rest = height - (v := self.potential(x)) + np.min(v)
-        inside = np.flatnonzero(rest >= 0)
-        if not len(inside) or inside[0] == 0 or inside[-1] == len(x) - 1 or np.ptp(v) == 0:
-            return []
-        x, y = x[inside], np.sqrt(2 * self.mass * rest[inside])
-        return [(np.concatenate([x, x[::-1], x[:1]]), np.concatenate([y, -y[::-1], y[:1]]))]
-
 
 _NAMES = {
     "particles": ("position q", "momentum p"),

@@ -173,7 +173,7 @@ def _apart(
         for i, (label, roundoff, beside, units, notes) in enumerate(json.loads(str(arrays["head"]))):
             parts = {part: arrays.get(f"{part}{i}") for part in (*PARTS, *OF_DECIMALS)}
             halves = [parts.pop(part) for part in OF_DECIMALS]
-            fixed = None if beside is None else Fixed(*halves, beside)
+            fixed = None if beside is None else Fixed(halves[0], halves[1], beside)
             found[label] = States(**parts, roundoff=roundoff, fixed=fixed, units=units, notes=tuple(notes))
         return found
 

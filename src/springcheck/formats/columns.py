@@ -54,6 +54,7 @@ SLOPE = 0.2
 
 ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Euler: record velocities too"
 """Note on a file that cannot distinguish schemes which share one recurrence of the positions."""
+BARE = "columns without names were taken as t, q and v: the last is the rate of the one before"
 ANEW = "name all columns, as --columns t,q,v; - leaves one out, as -,t,q,v"
 
 
@@ -114,8 +115,8 @@ def fitting(path: Path, found: States) -> States:
         return found
     fixed = found.fixed and Fixed(found.fixed.q * turned, found.fixed.v * factor, found.fixed.beside)
     units = {**found.units, "q": unit, "t": t, "v": f"{unit} {t}-1"}
-    q, v = found.q * turned, found.v * factor
-    return replace(found, q=q, v=v, fixed=fixed, units=units, notes=(*found.notes, *notes))
+    states = {"q": found.q * turned, "v": found.v * factor}
+    return replace(found, **states, fixed=fixed, units=units, notes=(*found.notes, *notes))
 
 
 def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
@@ -274,7 +275,8 @@ def _energies_alone(path: Path, columns: Columns) -> None:
         return
     parts = {name: x for name, x in found.items() if re.search("kin|pot", name, re.IGNORECASE)}
     whole = {name: x for name, x in found.items() if name not in parts}
-    name, total = next(iter(whole.items())) if whole else (" + ".join(parts), sum(parts.values()))
+    name = next(iter(whole), " + ".join(parts))
+    total = sum(np.reshape(x, (len(x), -1)).sum(axis=1) for x in ([whole[name]] if whole else parts.values()))
     size = float(np.max(np.abs(total))) or 1.0
     shown = f"{np.ptp(total) / size:.2g} of its size, {(total[-1] - total[0]) / size:+.2g} from start to end"
     raise StoreError(

@@ -24,9 +24,7 @@ IMAGES = "ix", "iy", "iz"
 """Counters of the borders that wrapped positions have crossed."""
 
 
-def of_frames(
-    path: Path, t: Sequence[float], q: Sequence[Any], v: Sequence[Any], coarse: float = 0.0
-) -> States:
+def of_frames(path: Path, t: Any, q: Sequence[Any], v: Sequence[Any], coarse: float = 0.0) -> States:
     """States of frames of as many particles each: q and v (n, 3), no v where there are none."""
     if len({len(x) for x in q}) > 1:
         raise StoreError(f"{path}: the number of particles changes from frame to frame")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError, nearest, plain
-from springcheck.formats.columns import Floats, States, is_rate, kind, kinds, listed, named, split
+from springcheck.formats.columns import BARE, Floats, States, is_rate, kind, kinds, listed, named, split
 from springcheck.physics.arrays import roundoff
 
 STATES = "y", "u", "state", "states", "sol", "solution", "z"
@@ -21,7 +21,8 @@ BETWEEN = "dt", "h", "delta_t", "timestep", "time_step"
 
 def of_table(path: Path, found: Any, names: Sequence[str], step: float | None = None) -> States:
     """The states in the unnamed columns (f, c) of an array, named by `names`."""
-    return split(path, named(path, np.asarray(found, np.float64), names), roundoff(found), step)
+    states = split(path, named(path, np.asarray(found, np.float64), names), roundoff(found), step)
+    return states if names else replace(states, notes=(*states.notes, BARE))
 
 
 def states_of(
@@ -72,27 +73,29 @@ def states_of(
         if meant.get(name) == "m" and name not in columns
     ]
     states = split(path, columns, roundoff(*(numbers[name] for name in columns)), step, finite)
-    return replace(states, mass=masses[0]) if masses else states
+    both = [name for name in given if name not in arrays] if not names else []
+    notes = [
+        f"{plain(name, 40)} was taken as positions and their rates, as SciPy writes them" for name in both
+    ]
+    return replace(states, mass=masses[0] if masses else states.mass, notes=(*states.notes, *notes))
 
 
 def _state_vector(arrays: Mapping[str, Any], step: float | None) -> tuple[Mapping[str, Any], float | None]:
     """Arrays with one state vector split into q and v, and the time between frames."""
-    plain_ = {
-        name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"
-    }
-    apart = [float(a.ravel()[0]) for name, a in plain_.items() if name.lower() in BETWEEN and a.size == 1]
+    good = {name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"}
+    apart = [float(a.ravel()[0]) for name, a in good.items() if name.lower() in BETWEEN and a.size == 1]
     step = apart[0] if step is None and apart else step
-    both = [name for name, a in plain_.items() if name.lower() in STATES and a.ndim == 2]
+    both = [name for name, a in good.items() if name.lower() in STATES and a.ndim == 2 and a.size]
     others = {kind(name) for name in arrays if name not in both} & {"q", "p", "v"}
     if len(both) != 1 or others:
         return arrays, step
-    t = next((a.ravel() for name, a in plain_.items() if kind(name) == "t"), None)
-    y = plain_[both[0]]
+    t = next((a.ravel() for name, a in good.items() if kind(name) == "t"), None)
+    y = good[both[0]]
     frames = max(y.shape) if t is None else len(t)
     y = y.T if len(y) != frames else y
     n, odd = divmod(y.shape[1], 2)
     clock: Floats = np.arange(frames) * (step or 1.0) if t is None else np.asarray(t, np.float64)
-    known = not odd and len(y) == frames and (t is not None or step)
+    known = n and not odd and len(y) == frames and (t is not None or step)
     if not known or not all(is_rate(clock, *np.asarray(y[:, [i, n + i]], float).T) for i in range(n)):
         return arrays, step
     rest = {name: a for name, a in arrays.items() if name != both[0]}
@@ -100,11 +103,8 @@ def _state_vector(arrays: Mapping[str, Any], step: float | None) -> tuple[Mappin
 
 
 def _may_be_left_out(path: Path, name: str, a: Any, rows: int) -> None:
-    """StoreError where an array named as a quantity of each frame cannot be read as one: without it, the
-    others would pass for all that was recorded.
-
-    Masses, and arrays shorter than half of the frames, such as initial values, belong to no frame.
-    """
+    """StoreError where an array named as a quantity of each frame cannot be read as one: others would pass
+    for all that was recorded.  Masses, and arrays shorter than half of the frames, belong to no frame."""
     if isinstance(a, StoreError):
         raise a
     if kind(name) != "m" and 2 * a.size > rows:
@@ -119,8 +119,7 @@ def _chosen(path: Path, arrays: Mapping[str, Any], names: Sequence[str]) -> Mapp
     for text in names:
         what, _, name = text.rpartition("=")
         if name not in arrays:
-            raise StoreError(
-                f"{path}: holds no array {name!r}{nearest(name, arrays)}; it has {listed(arrays)}"
-            )
+            near = nearest(name, arrays)
+            raise StoreError(f"{path}: holds no array {name!r}{near}; it has {listed(arrays)}")
         found[what or name] = arrays[name]
     return found

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Floats, States, counts_steps, kinds, listed, named, split, times
+from springcheck.formats.columns import BARE, Floats, States, counts_steps, kinds, listed, named, split, times
 from springcheck.formats.digits import SHOWN, fixed, number, roundoff
 
 COMMENT = ("#", "%", "!", "//")
@@ -150,7 +150,8 @@ def of_rows(
     meant = kinds(chosen)
     of = {what: [i for i, name in enumerate(chosen) if meant.get(name) == what] for what in "qpv"}
     states = split(path, columns, roundoff(first, [*of["q"], *of["p"], *of["v"]]), step)
-    return replace(states, fixed=fixed(first, of["q"], of["p"] or of["v"]))
+    notes = (*states.notes, *([] if names or header else [BARE]))
+    return replace(states, fixed=fixed(first, of["q"], of["p"] or of["v"]), notes=notes)
 
 
 def _cells(line: str) -> list[str]:

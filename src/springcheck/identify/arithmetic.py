@@ -11,10 +11,6 @@ from springcheck.identify.compare import SINGLE, Match
 from springcheck.identify.measure import Map
 from springcheck.identify.record import Record
 from springcheck.identify.storage import BINARY, ROUNDING
-from springcheck.identify.tables import power, table
-
-FIXED = 2.0**-33
-"""Quantum of forces in fixed point, relative to the largest force, as GPU platforms have it."""
 
 MOST_DRAG = 40.0
 """Drags over one step above which exp(-drag) is below every rounding."""
@@ -26,20 +22,15 @@ def arithmetic(record: Record, found: Map, m: Match) -> str:
     if m.row.damped and abs(m.g) > MOST_DRAG:
         return ""  # a step that keeps no digit of a velocity tells of no drag, and roundings have no size
     s, b, z = m.stride, m.entries.reshape(2, 2), found.z
-    a, g = np.array([m.a], np.longdouble), np.array([m.g], np.longdouble)
     ratio = float(found.size[1] / found.size[0])
-    rows, first = table((m.row,)), np.zeros(1, int)
-    one, step = rows.unit(first, a, g), rows.sizes(first, a, g).reshape(2, 2).astype(float)
-    # the roundings of a frame's first step, as its other steps carry them on
-    carried = np.abs(power(one, np.array([s - 1]))).reshape(2, 2).astype(float)
-    terms = np.maximum(carried @ step, step) * np.array([[1, ratio / s], [s / ratio, 1]])
+    terms = m.sums * np.array([[1, ratio / s], [s / ratio, 1]])
     terms = np.maximum(terms, np.abs(b.astype(float)))
     miss = np.abs((z[1:] - z[:-1] @ b.T).astype(float))
     size, middle = np.abs(z.astype(float)), np.abs((found.centre / found.size).astype(float))
     length = np.sqrt(np.sum(size**2, 1))
     total = size[:-1] @ terms.T + size[1:] + 2 * (middle + terms @ middle)
     total = total + (length[:-1] + length[1:])[:, None] * (s > 1)
-    if np.max(np.abs(one[2:, 0] - one[:2, 0] + [1, 0])) < 1e-12:
+    if m.of_way:
         # velocities may be differences of positions over the step
         total[:, 1] += 2 * s / ratio * (size[1:, 0] + middle[0])
     if record.mixed:

@@ -280,9 +280,12 @@ FAULTS = (
     ),
 )  # fmt: skip
 
+BOTH = "write position and velocity of one step"
 VIEWS: tuple[tuple[int | str, str, str], ...] = (
-    (-1, "whose velocities are one step behind the positions", "write position and velocity of one step"),
-    (1, "whose velocities are one step ahead of the positions", "write position and velocity of one step"),
+    (-1, "whose velocities are one step behind the positions", BOTH),
+    (1, "whose velocities are one step ahead of the positions", BOTH),
+    ("half before", "whose velocities are half a step behind the positions", BOTH),
+    ("half after", "whose velocities are half a step ahead of the positions", BOTH),
     ("mean", "with velocities by central differences of the positions", "write the velocities of the scheme"),
     ("later", "with velocities that are the next displacement over the step",
      "write the velocities of the scheme"),

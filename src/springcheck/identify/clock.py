@@ -22,6 +22,10 @@ SHORT_STEP = 9
 """Most significant decimal digits of a step that somebody typed."""
 
 
+class UnevenError(IdentificationError):
+    """Times that are not one interval apart, but for their rounding."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Clock:
     """The interval between frames [T] and its uncertainty."""
@@ -67,7 +71,7 @@ def clock_of(t: Floats) -> Clock:
         change = np.abs(np.diff(each))
         # of changes there and back, which roundings alone tell apart, the first
         at = int(np.argmax(change >= np.max(change) - 4 * even))
-        raise IdentificationError(
+        raise UnevenError(
             f"the states are not at a constant interval: frames {at + 1} and {at + 2} are "
             f"{float(each[at + 1]):.9g} apart, and the two before them {float(each[at]):.9g}; "
             "give a part of the trajectory with one interval"

@@ -15,7 +15,7 @@ from springcheck.identify.guesses import STRONG, guesses
 from springcheck.identify.measure import Map
 from springcheck.identify.rows import Row
 from springcheck.identify.storage import ROUNDING
-from springcheck.identify.tables import Table, power, table
+from springcheck.identify.tables import Table, power, product, table
 from springcheck.physics.arrays import Floats
 
 CHANCE, LIKELY = 1e-7, 25.0
@@ -59,6 +59,11 @@ class Match:
     chi2: float
     freedom: int
     entries: Any
+    sums: Any
+    """Sums (2, 2) of the absolute values of all terms of the map between frames, as far as roundings have
+    them."""
+    of_way: bool
+    """Whether velocities are differences of positions over the step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,13 +195,23 @@ def _matches(
         rank = (0 if far else turns[i], abs(float(x[0, i])) if unsure else float(chi2[i]))
         at = int(r[i]), int(s[i])
         best[at] = min(best.get(at, (rank, i)), (rank, i))
+    if not best:
+        return {}
+    kept = np.array([i for _, i in best.values()])
+    x, s, r = x[:, kept], s[kept], r[kept]
+    with np.errstate(all="ignore"):
+        one, step = compiled.unit(r, x[0], x[1]), compiled.sizes(r, x[0], x[1]).astype(float)
+        # the roundings of a frame's first step, as its other steps carry them on
+        sums = np.maximum(product(np.abs(power(one, s - 1)).astype(float), step), step)
+    way = np.max(np.abs(one[2:] - one[:2] + [[1], [0]]), axis=0) < 1e-12
     return {
         (row, n): Match(
-            row=rows[row], stride=n, turns=int(turns[i]), a=float(x[0, i]), g=float(x[1, i]),
-            a_error=float(error[0, i]), g_error=float(error[1, i]), log_scale=float(x[2, i]),
+            row=rows[row], stride=n, turns=int(turns[i]), a=float(x[0, c]), g=float(x[1, c]),
+            a_error=float(error[0, i]), g_error=float(error[1, i]), log_scale=float(x[2, c]),
             scale_error=float(error[2, i]), chi2=float(chi2[i]), freedom=int(freedom[i]), entries=e[:, i],
+            sums=sums[:, c].reshape(2, 2), of_way=bool(way[c]),
         )
-        for (row, n), (_, i) in best.items()
+        for c, ((row, n), (_, i)) in enumerate(best.items())
     }  # fmt: skip
 
 
@@ -268,7 +283,7 @@ def compare(
 
 
 def likely(joints: list[Joint]) -> list[Joint]:
-    """Those within five standard errors of the best."""
+    """The candidates within five standard errors of the best."""
     low = min((x.chi2 for x in joints), default=0.0)
     return sorted((x for x in joints if x.chi2 <= low + LIKELY), key=lambda x: x.simple)
 

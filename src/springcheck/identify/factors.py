@@ -73,6 +73,9 @@ def of_velocities(seen: Seen, x: Joint) -> str:
         (near(1 / m, 1), "the momentum is treated as a velocity", False),
         (near(m, 1), "velocities are momenta: they are multiplied by the mass", False),
         (near(m, 1 / m, stated=True), "the mass divides twice", False),
+        (abs(scale - 1) > 1e-3 and near(scale, 1 / scale, stated=True) and not near(h**2, h**-2)
+         and not near(h, 1 / h) and not near(1 / h, h),
+         f"the position is moved by p / {scale * m:.6g}, where the mass is {m:.6g}", False),
         (near(h**2, h**-4, stated=True),
          "position and momentum move by v / h and F / h, not by h v and h F: divided by the step", False),
         (near(h**2, h**-2), "the position moves by v / h, not by h v: divided by the step", False),

@@ -19,7 +19,8 @@ STRONG, FOLD, FOLD_DAMPED = 0.02, 0.02, 0.2
 """Loss from which a friction is strong, and how far beyond an extremum of its curve a row is tried."""
 
 ALIKE = 0.05
-"""Relative difference of the numbers of two guesses that are tried as one."""
+"""Relative difference of the numbers of two guesses of friction that are tried as one; of others a sixteenth,
+whose curves may have two near solutions."""
 
 
 def _roots(found: Map, strides: Sequence[int], exact: bool) -> list[tuple[int, int, float, float]]:
@@ -52,7 +53,7 @@ def _roots(found: Map, strides: Sequence[int], exact: bool) -> list[tuple[int, i
 
 
 def guesses(table: Table, found: Map, strides: Sequence[int]) -> tuple[Any, Floats]:
-    """First guesses: the row (c,) of each, and (stride, turns, a, g), (c, 4)."""
+    """First guesses: the catalogue row of each (c,), and its stride, turns, a and g (c, 4)."""
     every = np.array(_roots(found, strides, False)).reshape(-1, 4)
     rows: list[Any] = []
     out: list[Any] = []
@@ -95,16 +96,16 @@ def guesses(table: Table, found: Map, strides: Sequence[int]) -> tuple[Any, Floa
             rows.append(np.repeat(each, len(strong)))
             out.append(np.tile(strong, (len(each), 1)))
     r, got = np.concatenate(rows), np.concatenate(out)
-    return _unlike(r, got)
+    return _unlike(r, got, np.where(table.damped[r], ALIKE, ALIKE / 16))
 
 
-def _unlike(r: Any, got: Floats) -> tuple[Any, Floats]:
+def _unlike(r: Any, got: Floats, alike: Floats) -> tuple[Any, Floats]:
     """One of guesses that lie so near each other that they lead to one solution."""
     key = (r * 128 + got[:, 0].astype(int)) * 64 + got[:, 1].astype(int)
     for x in got[:, 2:].T:
         with np.errstate(all="ignore"):
-            size = np.clip(np.nan_to_num(np.rint(np.log(np.abs(x)) / ALIKE), neginf=-999), -999, 999)
-        key = key * 4096 + 2048 + np.where(x < 0, -1, 1) * (1000 + size).astype(int)
+            size = np.clip(np.nan_to_num(np.rint(np.log(np.abs(x)) / alike), neginf=-8e3), -8e3, 8e3)
+        key = key * 32768 + 16384 + np.where(x < 0, -1, 1) * (8000 + size).astype(int)
     first = np.sort(np.unique(key, return_index=True)[1])
     return r[first], got[first]
 

@@ -47,6 +47,9 @@ def turned(record: Record, moving: list[int]) -> Explanation | None:
     if not against:
         return None
     whose = "all coordinates" if against == moving else f"coordinate {', '.join(map(str, against))}"
+    if against == moving and record.interval < 0:
+        cause = "The motion runs forwards while its times fall: each step is |h|, not h"
+        return Explanation(cause, "look for abs(dt), or turn the velocities round", local=True)
     cause = f"The velocities of {whose} have the wrong sign: positions move against them"
     return Explanation(cause, "look at the sign of the velocities, and of the step", local=True)
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.bath import of_bath
+from springcheck.identify.clock import UnevenError
 from springcheck.identify.explain import drift, explain
 from springcheck.identify.measure import measure
 from springcheck.identify.positions import identify_positions
@@ -39,11 +40,21 @@ def identify_arrays(
     IdentificationError where the states cannot show a map: too few, not finite, at rest, at uneven times, or
     not spanning the plane.
     """
-    if uneven := of_uneven(times_of(t), q, p, v, mass, stiffness):
-        return uneven
-    if p is None and v is None:
-        return identify_positions(read(t, q, None, np.zeros(np.shape(q)), mass), stiffness, friction, step)
     stated: dict[str, Any] = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
+    try:
+        return _at_even_times(t, q, p, v, last, **stated)
+    except UnevenError:
+        if found := of_uneven(t, q, p, v, mass, stiffness):
+            return found
+        raise
+
+
+def _at_even_times(t: Any, q: Any, p: Any, v: Any, last: Any, **stated: Any) -> Identification:
+    """Identify states one interval apart, forwards or backwards in time.  Raises IdentificationError."""
+    step = stated["step"]
+    if p is None and v is None:
+        mass, *others = stated.values()
+        return identify_positions(read(t, q, None, np.zeros(np.shape(q)), mass), *others)
     times = times_of(t)
     if times[-1] >= times[0]:
         return _of_states(t, q, p, v, last, **stated)

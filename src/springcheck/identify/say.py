@@ -198,10 +198,9 @@ def of_another_friction(seen: Seen, joints: list[Joint]) -> Identification:
     else:
         share = c / seen.friction / (first.parts[0].g * first.stride)
         every = sorted(share * x.parts[0].g * x.stride for x in joints)
-        digits = 4 if every[-1] - every[0] < 1e-4 * every[0] else 3
-        low, high = (f"{every[i]:.{digits}g}" for i in (0, -1))
-        times = low if low == high else f"{low} to {high}"
-        cause = f"{whose}, but with a friction {times} times the stated"
+        alike = every[-1] - every[0] < 1e-4 * every[0]
+        where = "" if alike else f" ({every[0]:.3g} to {every[-1]:.3g} by where it acts)"
+        cause = f"{whose}, but with a friction {c / seen.friction:.4g} times the stated{where}"
     remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
     return _refuted(seen, Explanation(cause, remedy, local=True))
 

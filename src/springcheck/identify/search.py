@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from springcheck.identify.compare import SINGLE, Freedom, Joint, compare, likely
 from springcheck.identify.measure import Map
 from springcheck.identify.record import Record
 from springcheck.identify.repairs import turned
-from springcheck.identify.rows import Row
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats
 
@@ -286,13 +285,3 @@ def _best(good: Found, fine: bool) -> Found:
     cost = {id(x): x.chi2 + 4 * len(x.parts) * bool(x.row.free) * (not fine) for x, _ in good}
     low = min(cost.values(), default=0.0)
     return sorted(((x, a) for x, a in good if cost[id(x)] <= low + 25), key=lambda y: y[0].simple)
-
-
-def without_constant(seen: Seen, maps: list[Map]) -> Seen:
-    """The same with other maps."""
-    return replace(seen, maps=maps)
-
-
-def of_group(group: str) -> tuple[Row, ...]:
-    """The rows of a group, one for each map."""
-    return distinct(group)

@@ -20,8 +20,9 @@ from springcheck.schemes import SCHEMES, Scheme, step
 FEWEST_AT_LIMIT = 4
 """Frames that have to lie at one largest value for it to be a limit."""
 
-FAR_TIMES = 3.0
-"""Ratio of the interval to the steps from which on the times are wrong, whatever the scheme."""
+FAR_TIMES, STILL = 3.0, 0.05
+"""Ratio of the interval to the steps from which on the times are wrong, whatever the scheme, and the largest
+change of a state from frame to frame."""
 
 SOLVED = 1e-4
 """Largest error of an implicit step that is solved to a tolerance, relative to the state."""
@@ -190,9 +191,11 @@ def other_times(record: Record, j: int, m: Map, stiffness: float | None) -> Expl
     if stiffness is None or record.mass is None or not stiffness > 0:
         return None
     pull = stiffness / float(record.mass[j]) * float(record.interval) ** 2
-    (_, drift), (kick, _) = m.unscaled
+    (q, drift), (kick, v) = m.unscaled
     ways = (1 / drift if drift else -1.0, -pull / kick if kick else -1.0)
     factor = float(np.sqrt(max(ways[0] * ways[1], 0)))
+    if abs(q - 1) > STILL or abs(v - 1) > STILL:
+        return None
     if min(ways) <= 0 or not 0.8 < ways[0] / ways[1] < 1.25 or 1 / FAR_TIMES < factor < FAR_TIMES:
         return None
     cause = f"times are {factor:.3g} times what was stepped: the steps taken are about "

@@ -86,14 +86,15 @@ class Table:
 
     def unit(self, i: Any, a: Any, g: Any) -> Any:
         """Maps (4, c) of one step at a and g (c,)."""
-        m = self._powered(i, a, g)
+        m = self.powered(i, a, g)
         for view, which in self._views.items():
             some = which[i]
             if np.any(some):
-                m[:, some] = _recorded(m[:, some], view)
+                m[:, some] = _recorded(m[:, some], a[some], view)
         return m
 
-    def _powered(self, i: Any, a: Any, g: Any) -> Any:
+    def powered(self, i: Any, a: Any, g: Any) -> Any:
+        """Maps of the steps of a row, of its own velocities."""
         steps = self._steps[i]
         if not np.any(steps > 1):
             return self._stepped(i, a, g)
@@ -130,7 +131,7 @@ class Table:
 
     def sizes(self, i: Any, a: Any, g: Any) -> Any:
         """Sums (4, c) of the absolute values of all terms of the maps, which roundings are relative to."""
-        n, m = self._of(a.dtype.type), np.abs(self._powered(i, a, g))
+        n, m = self._of(a.dtype.type), np.abs(self.powered(i, a, g))
         if np.any(self._steps[i] > 1):
             return m
         for some in _where(self._explicit[i]):
@@ -179,14 +180,15 @@ def _rational(over: Any, under: Any, a: Any, g: Any) -> Any:
     return np.stack([x, y, -a * y, x - g * y])
 
 
-def _recorded(m: Any, view: int | str) -> Any:
-    """The map of q and of velocities that are recorded or made otherwise."""
+def _recorded(m: Any, a: Any, view: int | str) -> Any:
+    """The map of q and of velocities that are recorded or made otherwise; half a step is by the kick at q."""
     det = m[0] * m[3] - m[1] * m[2]
     back = np.stack([m[3], -m[1], -m[2], m[0]]) / det
     # v half a step ahead of the positions, or behind them, is that of kicks of half a step
     x, y = {
         1: lambda: m[2:], -1: lambda: back[2:], "mean": lambda: (m[:2] - back[:2]) / 2,
         "later": lambda: (m[0] - 1, m[1]), "earlier": lambda: (1 - back[0], -back[1]),
+        "half before": lambda: (a / 2, 1 + 0 * a), "half after": lambda: (-a / 2, 1 + 0 * a),
     }[view]()  # fmt: skip
     one, two, three, four = m[0] - m[1] * x / y, m[1] / y, m[2] - m[3] * x / y, m[3] / y
     return np.stack([one, two, x * one + y * three, x * two + y * four])
@@ -237,6 +239,10 @@ def _grid() -> Floats:
     return np.concatenate([-half[::-1], half])
 
 
+FLAT, LARGEST = 1e-12, 1e8
+"""Relative change of a curve from point to point that is rounding, and values without digits."""
+
+
 class Curves:
     """2 - trace/sqrt(det) and log |det| of every row from |a| = 1e-9 to 3600, in pieces on which the first
     rises or falls."""
@@ -249,19 +255,22 @@ class Curves:
         ]  # fmt: skip
         which = np.repeat([r for r, _ in each], len(grid))
         with np.errstate(all="ignore"):
-            m = table.unit(which, np.tile(grid, len(each)), np.repeat([x for _, x in each], len(grid)))
+            # ways to record velocities leave trace and determinant as they are
+            m = table.powered(which, np.tile(grid, len(each)), np.repeat([x for _, x in each], len(grid)))
             bends, losses = (x.reshape(len(each), -1) for x in bend_of(m))
-            signs = np.sign(np.diff(bends))
+            # where determinants are negative, or beyond all digits, rounding alone rises and falls
+            risen = np.diff(bends, axis=1)
+            signs = np.where(np.abs(risen) <= FLAT * np.abs(bends[:, 1:]), 0, np.sign(risen))
         pieces: list[Any] = []
         for (r, parameter), bend, loss, rises in zip(each, bends, losses, signs, strict=True):
-            good = np.isfinite(bend) & np.isfinite(loss) & (np.abs(grid) <= table.rows[r].most)
+            good = (np.abs(bend) < LARGEST) & np.isfinite(loss) & (np.abs(grid) <= table.rows[r].most)
             cut = np.flatnonzero((rises[1:] != rises[:-1]) | ~good[1:-1]) + 1
             for part in np.split(np.arange(len(grid)), cut):
                 # neighbouring pieces share the point between them
                 both = np.append(part, part[-1] + 1) if part[-1] + 1 < len(grid) else part
                 both = both[good[both]]
                 both = both if len(both) > 1 and bend[both[0]] < bend[both[-1]] else both[::-1]
-                if len(both) > 1:
+                if len(both) > 1 and rises[part[0] if part[0] < len(rises) else -1]:
                     pieces.append((r, parameter, bend[both], grid[both], loss[both]))
         self._row, self._parameter = (np.array([x[n] for x in pieces]) for n in (0, 1))
         ends = np.cumsum([len(x[2]) for x in pieces])

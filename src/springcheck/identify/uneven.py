@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from springcheck.identify.catalogue import PLAIN, capital, title, titles
+from springcheck.identify.record import of_size
 from springcheck.identify.result import Candidate, Explanation, Identification, nothing
 from springcheck.identify.storage import ROUNDING, storage
 from springcheck.identify.tables import table
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.text.wording import either
 
-FEWEST, ALIKE, OF_STIFFNESS = 12, 1e-6, 1e-7
-"""Fewest frames, the relative difference of intervals that are one, and of stiffnesses that agree."""
+FEWEST, OF_STIFFNESS = 12, 1e-7
+"""Fewest frames, and the relative difference of stiffnesses that agree."""
 
 SHARES = (0.5, 1.0, 0.25, 0.75, 2.0, 1.5, 4.0)
 """First guesses of the step that was taken in place of an interval, over it."""
@@ -28,21 +29,22 @@ NOW_SCALED = "Stoermer-Verlet, each displacement scaled where the step changes"
 
 
 def of_uneven(t: Any, q: Any, p: Any, v: Any, mass: Any, stiffness: Any) -> Identification | None:
-    """Identification of states of oscillators at uneven times; None where no scheme's steps are seen."""
+    """Identification of states of oscillators at uneven times; None where no scheme's steps are seen.  Raises
+    IdentificationError for a mass or a stiffness of another size."""
     times = np.asarray(t, np.float64)
     positions = np.reshape(np.asarray(q, np.float64), (len(times), -1))
     h, n = np.diff(times), positions.shape[1]
-    if len(times) < FEWEST or not np.all(h > 0) or np.ptp(h) <= ALIKE * np.max(h):
+    if len(times) < FEWEST or not np.all(h > 0):
         return None
-    m = np.broadcast_to(1.0 if mass is None else np.ravel(np.asarray(mass, np.float64)), n)
-    k = None if stiffness is None or mass is None else np.broadcast_to(np.ravel(stiffness), n) / m
+    weights = of_size("mass", mass, n)
+    m, spring = np.ones(n) if weights is None else weights, of_size("stiffness", stiffness, n, zero=True)
+    k = None if weights is None or spring is None or not np.all(spring) else spring / m
     moving = [j for j in range(n) if np.ptp(positions[:, j])]
     if p is None and v is None:
         said = [_of_positions(positions[:, j], h) for j in moving]
         return nothing([said[0]]) if said and said[0] and said.count(said[0]) == len(said) else None
-    speeds = np.reshape(np.asarray(p if v is None else v, np.float64), (len(times), -1)) / (
-        m if v is None else 1
-    )
+    speeds = np.reshape(np.asarray(p if v is None else v, np.float64), positions.shape)
+    speeds = speeds / m if v is None else speeds
     each = [_Steps(times, positions[:, j], speeds[:, j]) for j in moving]
     names = [one.taken(None if k is None else float(k[j])) for j, one in zip(moving, each, strict=True)]
     kept = [x for x in (names[0] if names else {}) if all(x in y for y in names)]

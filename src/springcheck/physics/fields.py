@@ -25,12 +25,12 @@ class SceneFields(FrozenArrays):
     m: Floats
     """Masses, > 0 (n,) [M]."""
     q: Floats
-    """Positions at the start (n,) [L]."""
+    """Initial positions (n,) [L]."""
     p: Floats
-    """Momenta at the start (n,) [M L/T]."""
+    """Initial momenta (n,) [M L/T]."""
     places: Integers | None = None
-    """Position of each coordinate among x, y and z of all particles (n,): 3 particle + axis.  Arrays (n,)
-    hold a number for each coordinate.  None where each particle has one, along x."""
+    """Index of each coordinate among x, y and z of all particles (n,): 3 particle + axis; None if each
+    particle moves along x only."""
     terms: tuple[Term, ...] = ()
     """One of each kind, in the order of `terms.known`; terms of one kind are joined."""
     step: float
@@ -39,7 +39,7 @@ class SceneFields(FrozenArrays):
     every: int = 1
     """Number of steps between recorded frames; it divides `steps`."""
     bath: Bath | None = None
-    """The heat bath, which random methods require; None where the motion is deterministic."""
+    """The heat bath, which random methods require, or None."""
     tolerance: float = 1e-12
     """Relative tolerance per step of adaptive solvers."""
     units: Units = "reduced"

@@ -27,10 +27,13 @@ MOST_STEPS = 2**53
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scene(SceneFields):
-    """A system, its start, its time grid, and what is recorded of it.
+    """A system, its initial state, its time grid, and what is recorded.
 
-    Construction, also by `dataclasses.replace`, raises SceneError for invalid values.  Arrays are stored as
-    read-only copies.  Its identity is `digest`, and `to_toml` writes it as a scene file.
+    Arrays are stored as read-only copies.  An invalid value raises SceneError, also in `dataclasses.replace`.
+    `digest` identifies a scene, and `to_toml` writes it as a scene file.
+
+    >>> Scene(m=[2.0], q=[0.0], p=[1.0], step=0.1, steps=100)
+    Scene('scene', 1 particle, free, 100 steps of 0.1)
     """
 
     def __post_init__(self) -> None:
@@ -50,11 +53,7 @@ class Scene(SceneFields):
 
     @cached_property
     def digest(self) -> str:
-        """The scene's identity: SHA-256 of all its numbers, without its texts.
-
-        Equal for scenes that no method can distinguish: name, title, source and the list of methods do not
-        count, nor does the sign of a zero.
-        """
+        """SHA-256 of all numbers of the scene; its texts, list of methods and signs of zeros do not count."""
         total = hashlib.sha256()
         known = (self.kind, self.units, self.step, self.steps, self.every, self.tolerance, *self.quantities)
         total.update(repr(known).encode())

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 FEWEST_PROSE_COLUMNS = 30
 """Fewest columns into which prose is wrapped."""
 COLUMN_GAP = 2
+WHOLE_FROM = 80
+"""Columns of a terminal from which on no table is split."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,8 @@ class TextTable:
     left: frozenset[str]
     prose: str
     drop: tuple[str, ...] = ()
-    """Columns that are left out, the first one first, where all do not fit beside each other."""
+    """Columns that are left out, the first one first, where all do not fit in `WHOLE_FROM` columns or more;
+    a narrower terminal has them in blocks."""
 
     def lines(self, wide: int) -> Iterator[Text]:
         """Its lines on a terminal of so many columns."""
@@ -78,7 +81,7 @@ class TextTable:
             words = [len(word) for row in cells if j < len(row) for word in str(row[j]).split()]
             widths[j] = min(widths[j], max(self._free(widths, j, wide), *words, 1))
         kept = list(range(len(widths)))
-        for title in self.drop:
+        for title in self.drop if wide >= WHOLE_FROM else ():
             if sum(widths[j] for j in kept) + COLUMN_GAP * (len(kept) - 1) > wide:
                 kept.remove(self.titles.index(title))
         for i, block in enumerate(_blocks(widths, kept, wide)):

@@ -21,9 +21,6 @@ from springcheck.physics.termcheck import FORMULA_ROUNDINGS
 
 TINY = float(np.finfo(np.float64).tiny)
 
-MOST_CHECKED = 64
-"""Rows for which a compiled slope is compared with that of NumPy."""
-
 
 @cache
 def _slope(kind: Any) -> tuple[Any, str]:
@@ -32,21 +29,24 @@ def _slope(kind: Any) -> tuple[Any, str]:
     import numba
 
     parameters = [c.field for c in kind.columns if c.field not in (kind.origin, "number")]
-    known = {"law": numba.njit(**HELP)(kind.slope)}
     # numba knows no calls with a varying number of arguments
     arguments = ", ".join(f"x[{i}, s]" for i in range(len(parameters)))
     source = f"lambda u, x, s: law(u, {arguments})"
     signature = numba.float64(numba.float64, numba.float64[:, ::1], numba.int64)
     try:
-        return numba.njit(signature, **HELP)(eval(source, known)), ""
+        law = numba.njit(**HELP)(kind.slope)
+        return numba.njit(signature, **HELP)(eval(source, {"law": law})), ""
     except Exception as error:
         said = [line.strip() for line in str(error).splitlines() if line.strip()]
-        why = next((line for line in said if not line.startswith(("Failed in", "\x1b"))), "") or said[:1]
+        told = (line for line in said if not line.startswith(("Failed in", "\x1b")))
+        why = next(told, type(error).__name__)
         return None, f"numba: {why:.120}"
 
 
 def why_not(kind: Any) -> str:
     """Why a term is not compiled, in a clause; empty where it is."""
+    if kind.key not in KINDS and kind.kind != "potential":
+        return "it is no potential"
     try:
         return "" if kind.key in KINDS else _slope(kind)[1]
     except ImportError:
@@ -105,16 +105,17 @@ def compiled(term: Term) -> tuple[Any, ...]:
 
 
 def obstacle(term: Term, q: Floats) -> str:
-    """Why a term is not compiled; empty where its compiled slope is NumPy's at q (n,), to rounding."""
+    """Why a term is not compiled; empty where its compiled force is NumPy's near q (n,), to rounding."""
     kind: Any = type(term)
     if why := why_not(kind):
         return why
-    of, (_, _, x) = _slope(kind)[0], arrays(term)
-    start = term.lengths(q) if isinstance(term, Distances) else term.elongation(q)
-    for u in (start[:MOST_CHECKED], 1.25 * start[:MOST_CHECKED]):
-        given = [x[: len(u)] for x in term.parameters]
-        found = np.array([of(float(u[s]), x, s) for s in range(len(u))])
-        bound = FORMULA_ROUNDINGS * 2.0**-53 * np.abs(term.rounding(np.abs(u), u, *given))
-        if not np.all(np.abs(found - term.slope(u, *given)) <= bound):
-            return "numba makes another function of its slope"
+    *given, pull = compiled(term)
+    for at in (q, 1.25 * q):
+        found, right, bound = np.zeros((3, len(q)))
+        pull(*given, at, found)
+        # a force that depends on the velocity is no function of u
+        term.add_force(at, 1 + np.abs(at), right)
+        term.add_rounding(np.abs(at), 0 * at, bound, at, False)
+        if not np.all(np.abs(found - right) <= FORMULA_ROUNDINGS * 2.0**-53 * bound):
+            return "its compiled force is another than NumPy's"
     return ""

@@ -31,8 +31,9 @@ WORTH = 1_000_000
 takes 0.15 s, loading cached code 5 ms, compiling it the first time 1 to 4 s."""
 
 
-WORTH_A_LAW = 100_000
-"""Calls of the force from which on compiling a term's slope pays: NumPy takes 10 us each, compiling 1 s."""
+WORTH_A_LAW = 200_000
+"""Calls of the force from which on compiling a term's slope pays: NumPy takes 25 us each, compiling 1 s, and
+the first time 4 s more for the kernel."""
 
 
 class Own:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -68,8 +67,7 @@ def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> At
     """The cells of these methods; those that an earlier call has saved are not measured again."""
     usable, left_out = sorted_out(labels, absence, "has extreme cases here")
     pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
-    work = [replace(x, cost=10.0 if on_platform(y) else 1.0) for x, y in zip(pieces, usable, strict=True)]
-    found = [cell for piece in kept.results(work) for cell in piece]
+    found = [cell for piece in kept.results(pieces) for cell in piece]
     return Atlas(cells=tuple(found), left_out=tuple(left_out))
 
 

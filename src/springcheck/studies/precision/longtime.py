@@ -186,7 +186,7 @@ class LongTime(Studied):
 
     def answer(self) -> Lines:
         """Where higher orders fall behind."""
-        out = []
+        out: Lines = []
         for a, b, steps in self.crossings:
             periods = steps * abs(self.scene.step) * self.w / (2 * math.pi)
             said = f"{a.method} (order {a.order}) falls behind {b.method} (order {b.order}) after"

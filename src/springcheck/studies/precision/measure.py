@@ -16,6 +16,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Unpack
 
+import numpy as np
+
 from springcheck import engines, schemes
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
@@ -78,11 +80,11 @@ def _measure(
     scene: Scene, labels: Sequence[Label], budget: float, metric: str, left: Sequence[LeftOut], kept: Keeper
 ) -> PrecisionStudy:
     known = truth(scene)
-    began = perf_counter()
+    began = np.inf
 
     def tell(what: str) -> None:
         if kept.progress:
-            kept.progress(min(perf_counter() - began, budget), budget, what)
+            kept.progress(min(max(perf_counter() - began, 0.0), budget), budget, what)
 
     sweeps: list[Sweeping] = []
     for label in labels:

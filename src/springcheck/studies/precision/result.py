@@ -106,7 +106,7 @@ class PrecisionStudy(Studied):
             cells: list[str] = []
             for kind in ("time", "calls"):
                 found = self.winner(kind, target)
-                cells += [found[0].method, _cost(kind, found[1])] if found else ["none", ""]
+                cells += [found[0].method, cost_in_words(kind, found[1])] if found else ["none", ""]
             rows.append((f"{target:.0e}", *cells))
         titles = ("error", "least time, of the methods measured", "time", "least force calls", "calls")
         return table(titles, rows, left=titles[1:4:2])
@@ -120,7 +120,7 @@ class PrecisionStudy(Studied):
                 cheapest = won is not None and won[0].method == x.method
                 below = x.floor is not None and target < x.floor
                 cost = x.cost(kind, target)
-                text = _cost(kind, cost) if cost < math.inf else "floor" if below else "-"
+                text = cost_in_words(kind, cost) if cost < math.inf else "floor" if below else "-"
                 cells.append(plain(f"{text}*" if cheapest else text, "bold green" if cheapest else ""))
             rows.append((x.method, *cells))
         return table(("method", *(f"{x:.0e}" for x in TARGETS)), rows)
@@ -231,7 +231,7 @@ QUANTITIES = {**COSTS, **{name: f"{name} error" for name in METRICS}}
 """What an axis of the figure may show, and its name there."""
 
 
-def _cost(kind: str, x: float) -> str:
+def cost_in_words(kind: str, x: float) -> str:
     """Two digits and a unit, or a whole number up to five digits."""
     if kind == "calls":
         return f"{math.ceil(x)}" if x < 1e6 else f"{x:.1e}".replace("e+0", "e")

@@ -81,10 +81,10 @@ class Sweeping:
         )  # fmt: skip
 
     def line(self, metric: str) -> str:
-        """What is newly known: the time of a step, or the smallest of `TARGETS` that was reached."""
+        """What is newly known: the time of its first run, or the smallest of `TARGETS` that was reached."""
         if not self.points:
-            steps = self.scene.steps if self.scene else 0
-            return f"{self.label}: {seconds(self.run / steps)} a step" if self.run and steps else ""
+            steps = count(self.scene.steps, "step") if self.scene else ""
+            return f"{self.label}: {steps} in {seconds(self.run)}" if self.run and steps else ""
         *before, last = [x.error(metric) for x in self.points]
         reached = [x for x in TARGETS if last <= x < min(before, default=np.inf)]
         if not reached:

@@ -82,7 +82,7 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
     unit = f"root of the {scene.system.norm.of or 'unit'}, as the start has no energy"
     unit = "initial energy norm" if "initial" in unit else unit
     return [
-        table(titles, rows, left=("method", "outcome")),
+        table(titles, rows, left=("method", "outcome"), drop=("start", "energy")),
         plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
         *[plain(f"<: {BELOW}", "dim")] * any(run.error_below for run in runs),
         *[plain(f"-: no reference solution, because {why}", "dim") for why in [no_reference(scene)] if why],
@@ -149,7 +149,7 @@ def temperatures(found: Sequence[Heated]) -> Lines:
     return [
         plain(),
         plain("Temperatures over that of the bath, exact for each scheme, and as measured:"),
-        table(titles, rows, left=("method",)),
+        table(titles, rows, left=("method",), drop=("measured ", "kinetic")),
     ]
 
 
@@ -195,7 +195,9 @@ def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> Tex
         if exact:
             cells.append(plain(f"{good}/{len(rest)}", "" if good == len(rest) else "bold red"))
         rows.append((method, *cells))
-    return table(["method", *(short[check] for check in shown), *(["exact"] if exact else [])], rows)
+    titles = [short[check] for check in shown]
+    # on a narrow terminal; what fails is printed in full below
+    return table(["method", *titles, *["exact"] * exact], rows, drop=titles[:0:-1])
 
 
 def _cell(verdict: Verdict | None) -> Text:
@@ -293,7 +295,8 @@ def differences(comparison: Comparison) -> TextTable:
         (f"{i} {label}", *(_short(x) for x in comparison.max_difference[i, : i + 1]))
         for i, label in enumerate(comparison.labels)
     ]
-    return table(["", *map(str, range(len(comparison.labels)))], rows, left=("",))
+    numbers = [str(i) for i in range(len(comparison.labels))]
+    return table(["", *numbers], rows, left=("",), drop=numbers[:0:-1])
 
 
 def _short(x: float) -> str:
