@@ -45,9 +45,9 @@ from springcheck.text.wording import DIAGNOSIS, count, few
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "DIAGNOSIS", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "are_differences", "arithmetic", "bridges",
-    "cause_of", "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
-    "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
-    "tolerance", "tolerance_bound", "worst",
+    "cause_of", "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge",
+    "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect",
+    "summary", "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
 
 CHECKS: tuple[Check, ...] = (

@@ -83,8 +83,8 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def are_differences(case: Case) -> bool:
-    """Whether velocities that are not declared so are differences of the positions over a step or two, or with
-    half a kick, and every step is right to what those keep."""
+    """Whether velocities are undeclared differences of the positions, over a step or two or with half a kick,
+    and every step is right to what those keep."""
     run, m = case.trajectory, case.judged.m
     half = run.arithmetic.recorded(m, run.step, False)[1]
     for n, kick in ((1, 0.0), (2, 0.0), (1, 0.5)) if run.every == 1 and not run.rebuilds_velocity else ():
