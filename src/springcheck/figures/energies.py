@@ -89,7 +89,7 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     said = ""
     if scene.system.keeps_energy or changes:
         largest = _largest(runs, differences)
-        said = extremes(largest, "energy off by at most {}", beyond=LARGE_ENERGY)
+        said = extremes(largest, "energy off by at most {}", beyond=MOST_DRAWN)
         if scene.system.keeps_energy and (most := max(largest.values())) <= ALL_ROUNDED:
             said = f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
     # coinciding lines are better shown by their differences
