@@ -238,7 +238,7 @@ def _off(runs: Runs, view: View) -> str:
         with np.errstate(all="ignore"):
             each = [np.max(np.abs(x - true)) / (np.ptp(true) or 1.0) for x, true in both]
             found[group.title] = float(np.max(each))
-    return extremes(found, f"{view.what} off by at most {{}} of its range")
+    return extremes(found, f"largest {view.what} error {{}} of the range")
 
 
 def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> str:
