@@ -9,12 +9,9 @@ once. With SRC, the folder `src` of another checkout, the same trajectories go t
 this one, twice each, and the ratio of the two is printed; the shortest time of each trajectory counts,
 after one call that is not timed.
 
-Printed for 15 calls on two cores that others used as well (median and most):
-    plain 5.3 and 12.0 ms.  damped 10.4 and 34.0.  held 7.2 and 15.4.  single 24.8 and 533.4
-    text 17.2 and 122.8.  systematic error 36.1 and 127.5.  16 oscillators 31.0.  as drawn 12.0 and 274.0
-    mean as drawn 19.7 ms: 3.66e+05 calls an hour on two cores
-Commit 93225b79 in turn with it: 5.2 (plain), 10.4, 7.8 (held), 22.9, 17.3, 35.0, 47.6 (16 oscillators); 12.7
-as drawn.
+Printed for 2 calls on two cores that others used as well (median and most):
+    plain 15.0 and 16.1 ms.  damped 58.7 and 59.0.  held 17.5 and 18.0.  single 73.1 and 120.8
+    text 60.6 and 98.1.  systematic error 143.0 and 201.2.  16 oscillators 103.6.  as drawn 76.2 and 385.4
 """
 
 from __future__ import annotations
