@@ -39,7 +39,7 @@ TO_COME = {
     ("identify",): 6155,
     ("store",): 2655,
     ("formats",): 1531,
-    ("studies",): 6420,
+    ("studies",): 6412,
     ("figures",): 2270,
     ("cli",): 3240,
     ("api", "text", "errors", "interrupts", "plot", "__init__", "__main__"): 1410,
