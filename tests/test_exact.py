@@ -340,8 +340,12 @@ def test_a_reference_is_read_from_its_store(tmp_path: Path, monkeypatch: pytest.
         patch.setattr(reference, "_STORED", {})
         with pytest.raises(pytest.fail.Exception):
             exact.true_motion(keeper.stored_scene(tmp_path / "k.h5"), 2 * steps, scene.step)
-    with h5py.File("k.h5", "r+") as file:
-        file["reference/starts"][0, 0] += 1e-9
-    monkeypatch.setattr(reference, "_STORED", {})
-    again = keeper.stored_scene(tmp_path / "k.h5")
-    assert np.array_equal(exact.true_motion(again, steps, scene.step)[0], right[0])
+    for name, value in (("starts", 1.0), ("series", np.nan), ("powers", 1e300), ("dq", -1.0)):
+        with h5py.File("k.h5", "r+") as file:
+            before = file[f"reference/{name}"][0, 0]
+            file[f"reference/{name}"][0, 0] = value * (1 + 1e-9)
+        monkeypatch.setattr(reference, "_STORED", {})
+        again = keeper.stored_scene(tmp_path / "k.h5")
+        assert np.array_equal(exact.true_motion(again, steps, scene.step)[0], right[0])
+        with h5py.File("k.h5", "r+") as file:
+            file[f"reference/{name}"][0, 0] = before

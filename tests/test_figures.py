@@ -390,13 +390,13 @@ def test_each_method_in_a_bath_has_a_line_and_states_of_its_own() -> None:
 
 
 def test_a_title_of_the_frames_drawn_says_so() -> None:
-    """Of a run of more frames than are drawn the rest may be further off than "at most"."""
+    """Of a run of more frames than are drawn the rest may be further off than "largest"."""
     scene = scenefile.load_scene("spring-uneven")
     (made,) = runs(scene, "own:semi-implicit-euler").values()
     few = replace(made.at(slice(None, None, 4)), every=4 * made.every)
     for run in (made, few):
         said = [bank.foot for bank in of_runs(scene, {run.label: run}, {run.label: run})]
-        most = [heading for heading in said if "at most" in heading]
+        most = [heading for heading in said if "largest" in heading]
         assert len(most) >= 2
         assert all(("of the frames drawn" in heading) == (run is few) for heading in most), most
 
@@ -436,10 +436,10 @@ def test_the_title_of_errors_says_who_is_nearest_and_who_is_farthest() -> None:
     made = runs(scene, *OWN)
     figure = figures(scene, made)["error"]
     title = " ".join(figure.get_suptitle().split())
-    assert title == "Off the exact solution by at most 4.9 % to 171 %"
+    assert title == "Largest distance from the exact solution 4.9 % to 171 %"
     title = " ".join(figure.get_supxlabel().split())
     assert re.search(
-        r"exact solution by at most 4\.9 % \(semi-implicit Euler, kick-drift\) to 171 % \(explicit Euler\)$",
+        r"exact solution 4\.9 % \(semi-implicit Euler, kick-drift\) to 171 % \(explicit Euler\)$",
         title,
     ), title
 
@@ -523,5 +523,5 @@ def test_energies_beyond_double_precision_are_drawn_without_a_warning() -> None:
 
 
 def test_a_title_without_names_drops_brackets_within_brackets() -> None:
-    said = "states off by at most 4e-07 (classical Runge-Kutta (RK4)) to 39 % (explicit Euler)"
-    assert overlay.short(said) == "States off by at most 4e-07 to 39 %"
+    said = "largest state error 4e-07 (classical Runge-Kutta (RK4)) to 39 % (explicit Euler)"
+    assert overlay.short(said) == "Largest state error 4e-07 to 39 %"

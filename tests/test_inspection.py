@@ -243,7 +243,7 @@ def test_a_part_of_a_run_is_called_one_and_errors_are_those_of_all_of_it(tmp_pat
     phase, position, _, error = of_runs(scene, found.runs, found.followed)
     # its phase, (h w)**3 / 24 a step, is half a turn behind in the middle and nearly a whole one at the end
     for bank, most in ((phase, "200 %"), (position, "100 %"), (error, "200 %")):
-        assert f"by at most {most} (velocity Verlet)" in f"{bank.heading} {bank.foot}"
+        assert f"{most} (velocity Verlet)" in f"{bank.heading} {bank.foot}"
     for bank in (phase, position):
         assert "from t = 29415.4 on" in f"{bank.heading} {bank.foot}"
 

@@ -217,7 +217,7 @@ def test_a_bath_that_makes_no_sense_is_one_line(text: str) -> None:
         (["--temperature", "300K", "--method", "own:euler"],
          "explicit-euler has no noise, and the scene has a bath"),
         (["--temperature", "1", "--command", "c=false {scene} {out}", "--scheme", "baoab"],
-         "a thermostat of your own joins by --engine, and `springcheck identify` reads friction and kT off"),
+         "add your thermostat with --engine, or let `springcheck identify` find friction and kT"),
         (["--method", "own:baoab"], "it is a thermostat, for scenes with a bath"),
         (["--temperature", "300K", "--method", "openmm:verlet"],
          "the thermostats of OpenMM are openmm:langevin-middle-bath, "),

@@ -105,7 +105,7 @@ def extremes(
     methods, path, force, workers
         As in `run` and `stability`.
     quick
-        Measure fewer cells (20 s).
+        Measure a third of the cells.
 
     Returns
     -------

@@ -36,7 +36,7 @@ from springcheck.checks.motion import (
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, step_defect
+from springcheck.checks.steps import BLIND, are_differences, arithmetic, bridges, seldom_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -44,10 +44,10 @@ from springcheck.text.wording import DIAGNOSIS, count, few
 
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "DIAGNOSIS", "TELLING", "THOROUGH",
-    "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
-    "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
-    "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
-    "tolerance", "tolerance_bound", "worst",
+    "Bench", "Case", "Check", "Run", "angular_momentum", "are_differences", "arithmetic", "bridges",
+    "cause_of", "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge",
+    "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect",
+    "summary", "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
 
 CHECKS: tuple[Check, ...] = (

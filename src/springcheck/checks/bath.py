@@ -37,20 +37,17 @@ def _reading(case: Case) -> Reading:
     return read_frames(case, *(x[_unread(case) :] for x in (case.trajectory.q, case.trajectory.p)))
 
 
-def read_frames(case: Case, q: Floats, p: Floats, *, scheme: Thermostat | None = None) -> Reading:
-    """The draws behind other frames q, p (f, n) of the case's scene, by its scheme or another."""
-    run, scheme = case.trajectory, scheme or thermostat(case)
-    return bath.draws.read(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
+def read_frames(case: Case, q: Floats, p: Floats) -> Reading:
+    """The draws behind other frames q, p (f, n) of the case's scene."""
+    run = case.trajectory
+    return bath.draws.read(
+        thermostat(case), case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity
+    )
 
 
 def _unread(case: Case) -> int:
     """Frames before the first draw that can be read: of one that acts in two steps the start has none."""
     return int(thermostat(case).carried > 0 and case.steps[0] == 0)
-
-
-def rows_a_step(case: Case) -> int:
-    """Rows of draws that each step has."""
-    return len(reading(case).draws) // (len(case.trajectory.t) - 1 - _unread(case))
 
 
 @check("across", family="noise", requires={"every-step"})

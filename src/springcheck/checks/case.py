@@ -196,7 +196,7 @@ class Case(Claim):
 
     @cached_property
     def closed_states(self) -> tuple[Extended, Extended]:
-        """The scheme's closed-form motion at the frames: modes about their centres, (f, n) each."""
+        """The scheme's discrete solution at the frames: modes about their centres, (f, n) each."""
         return self.closed_at(self.steps)
 
     def closed_at(self, steps: Integers) -> tuple[Extended, Extended]:
@@ -281,10 +281,10 @@ class Case(Claim):
 
     @cached_property
     def envelope(self) -> tuple[Extended, Extended]:
-        """What |q| and |p| (n,) never exceed while the map's determinants do not grow.
+        """Upper bounds of |q| and |p| (n,) while the map's determinants do not grow.
 
-        Each mode stays within its invariant ellipse, whose axes have the ratio `schemes.condition`;
-        a mode that does not turn is left at its start.
+        Each mode stays within its invariant ellipse, whose axes have the ratio `schemes.condition`; a mode
+        that does not oscillate keeps its initial size.
         """
         modes, (u, v) = self.system.modes, self.mode_start
         axes = schemes.condition(self.law.propagator, self.w)

@@ -18,7 +18,6 @@ from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
 from springcheck.physics.arrays import Extended, Floats, Integers
-from springcheck.physics.term import Term
 from springcheck.text.wording import either
 
 VALUE_STEPS = 8
@@ -181,12 +180,6 @@ def _objects(of: list[tuple[tuple[int, ...], int]]) -> list[Rows]:
         name = f"particle{'s' if len(ends) > 1 else ''} {' and '.join(ends)}"
         found.append((name, np.array([each == one for each in of])))
     return found
-
-
-def single_rows(term: Term, places: Integers) -> list[Rows]:
-    """Each row of a term by itself, named by its particles, and by its axis where these have several."""
-    objects = _objects(term.objects(places))
-    return [x for x in objects if np.sum(x[1]) == 1] + _alone(objects, places[term.particles[0]])
 
 
 def _alone(objects: list[Rows], places: Integers) -> list[Rows]:

@@ -82,6 +82,22 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     return np.where(told, bound, 1), told
 
 
+def are_differences(case: Case) -> bool:
+    """Whether velocities are undeclared differences of the positions, over a step or two or with half a kick,
+    and every step is right to what those keep."""
+    run, m = case.trajectory, case.judged.m
+    half = run.arithmetic.recorded(m, run.step, False)[1]
+    for n, kick in ((1, 0.0), (2, 0.0), (1, 0.5)) if run.every == 1 and not run.rebuilds_velocity else ():
+        q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
+        made = m * (run.q[n:] - run.q[:-n]) / (n * run.step)
+        off = np.abs(p - made - kick * run.step * case.system.force(q, p)) - half / n
+        # of a product, a quotient, a kick, recording
+        if np.all(off <= 4 * run.arithmetic.state * (np.abs(p) + np.abs(made))):
+            declared = replace(case, trajectory=replace(run, rebuilds_velocity=True))
+            return step_defect(declared).passed is True
+    return False
+
+
 BLIND = "cannot be judged by single steps here: rounding may be as large as they are"
 
 NO_BETTER = "cannot be judged to better than that here: rounding is as large"

@@ -59,7 +59,7 @@ WIDENED = 3.32
 """Factor by which an estimate from `SAMPLES` is below the standard deviation once in a million:
 chi-squared."""
 
-NUMBERS = 1 << 20
+NUMBERS = 1 << 18
 """Entries of states and tangent maps that are in memory at a time: 16 MB, and a few times as much for
 temporaries."""
 
@@ -217,7 +217,7 @@ def _in_width(case: Claim, q: Extended, p: Extended, steps: int, width: Any) -> 
         before, on = size, np.stack(case.step(*on, met=places))
         if places is not None:
             places = [np.asarray(x, width) for x in places]
-        last = SAFE * np.stack(rounding.of_step(case, *before, places, width=width))
+        last = SAFE * np.stack(rounding.of_step(case, before[0], before[1], places, width=width))
         size = on.astype(width)
         way = np.stack([np.sign(before), np.sign(size - before)]).astype(np.int8)
         # of few coordinates in a step the sign, or that of their change, is another than before
@@ -339,7 +339,7 @@ def derivatives(
     at[1, 1] = p
     with np.errstate(all="ignore"):
         for _ in range(steps):
-            at = np.stack(_varied(case, *at, scaled))
+            at = np.stack(_varied(case, at[0], at[1], scaled))
     at[1, 1] -= at[1, 0]
     return at[0, 1:], at[1, 1:]
 

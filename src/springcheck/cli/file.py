@@ -18,16 +18,13 @@ from springcheck.formats import States
 from springcheck.identify import scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.physics.trajectory import Trajectory, Verdict
+from springcheck.physics.trajectory import Verdict
 from springcheck.studies import choose, keeper
 from springcheck.studies.choose import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step|less than double precision"
-
-DIFFERENCE_ROUNDINGS = 4
-"""Roundings of a velocity and of the difference in it: of a product, a quotient, a kick, recording."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,20 +132,6 @@ def _shown(path: Path, states: States, scene: Scene) -> schemes.Scheme:
     return schemes.scheme(found.scheme)
 
 
-def _are_differences(scene: Scene, run: Trajectory) -> bool:
-    """Whether velocities are differences of the positions over a step or two, or with half a kick, and every
-    step is right to what those keep."""
-    half = run.arithmetic.recorded(scene.m, run.step, False)[1]
-    for n, kick in ((1, 0.0), (2, 0.0), (1, 0.5)) if run.every == 1 else ():
-        q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
-        made = scene.m * (run.q[n:] - run.q[:-n]) / (n * run.step)
-        off = np.abs(p - made - kick * run.step * scene.system.force(q, p)) - half / n
-        if np.all(off <= DIFFERENCE_ROUNDINGS * run.arithmetic.state * (np.abs(p) + np.abs(made))):
-            declared = checks.Case(trajectory=replace(run, rebuilds_velocity=True), scene=scene)
-            return checks.step_defect(declared).passed is True
-    return False
-
-
 def judge(
     path: Path,
     *,
@@ -195,7 +178,7 @@ def judge(
     if arithmetic is None and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
         notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
     wrong = any(v.passed is False and v.check in checks.TELLING for v in verdicts)
-    if wrong and not run.rebuilds_velocity and _are_differences(judged, run):
+    if wrong and checks.are_differences(checks.Case(trajectory=run, scene=judged)):
         notes += ("velocities are differences of the positions, which keep eps q/h of them: --differences",)
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,

@@ -69,9 +69,11 @@ def answer(
     if options.json:
         schema = f"springcheck/{name or options.name}/{SCHEMAS.get(name or options.name, 1)}"
         whole = json.dumps({"schema": schema, **data}, allow_nan=False, indent=2)
-        print(whole)
+        print(whole, flush=True)
     elif not getattr(options, "quiet", False) and (said := lines()):
         show(said)
+    if "keeps" not in options:
+        interrupts.announce("interrupted; the answer is complete")
     return status
 
 

@@ -294,8 +294,8 @@ def refusal(scene: Scene, label: Label) -> str | None:
     if scene.bath and not what.generator:
         if is_brought(label.engine):
             return (
-                "it declares no noise, and the scene has a bath; a thermostat of your own joins by --engine, "
-                "and `springcheck identify` reads friction and kT off its states"
+                "it declares no noise, and the scene has a bath: add your thermostat with --engine, or let "
+                "`springcheck identify` find friction and kT in its states"
             )
         own = [parse(f"{label.engine}:{name}") for name in engine(label.engine).thermostats]
         able = [str(one) for one in own if refusal(scene, one) is None]

@@ -155,7 +155,7 @@ def arithmetic(label: Label) -> Arithmetic:
 
 
 def _has_motor(label: Label) -> bool:
-    """Whether the force is ours, by a motor."""
+    """Whether a motor applies the force, which springcheck computes."""
     return label.method.startswith("motor")
 
 

@@ -85,11 +85,11 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     )
     differences = {run.label: off(run) for run in runs.every}
     what = "exact" if changes else "initial"
-    lower = decades(runs, differences, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
+    lower = decades(runs, differences, f"|energy - {what}| / {of}", f"Difference from the {what} energy.")
     said = ""
     if scene.system.keeps_energy or changes:
         largest = _largest(runs, differences)
-        said = extremes(largest, "energy off by at most {}", beyond=LARGE_ENERGY)
+        said = extremes(largest, "largest energy error {}", beyond=MOST_DRAWN)
         if scene.system.keeps_energy and (most := max(largest.values())) <= ALL_ROUNDED:
             said = f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
     # coinciding lines are better shown by their differences
@@ -141,7 +141,7 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
     some = {name: x for name, x in off.items() if np.isfinite(x)}
     if not some:
         return ""
-    return extremes(some, "states off by at most {}", beyond=MOST_DRAWN * exact.reach(runs.longest))
+    return extremes(some, "largest state error {}", beyond=MOST_DRAWN * exact.reach(runs.longest))
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
@@ -213,5 +213,5 @@ def error(runs: Runs, exact: Exact) -> Bank:
     largest = _largest(runs, found)
     some = {label: x for label, x in largest.items() if np.isfinite(x)}
     far = MOST_DRAWN * exact.reach(runs.longest)
-    said = extremes(some, "off the exact solution by at most {}", beyond=far) if some else "errors"
+    said = extremes(some, "largest distance from the exact solution {}", beyond=far) if some else "errors"
     return runs.bank("error", charts, said, (7.2, 4.2 if len(charts) == 1 else 2.6))

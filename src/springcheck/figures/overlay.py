@@ -178,7 +178,7 @@ class Runs:
         """The charts of a figure, under what is said of them."""
         # of a long run every so many frames, between which it may be further off
         thinned = not self.errors and any(run.every > self.scene.every for run in self.every)
-        few = thinned and "at most" in said
+        few = thinned and "largest" in said
         whole = f"{self.wrong}{said}{' (of the frames drawn)' * few}"
         return Bank(
             name=name, title="Methods drawn", charts=charts, size=size, columns=columns,

@@ -213,8 +213,9 @@ def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -
 
 
 def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Runs) -> Bank:
-    """Positions over time: a row for each view; of many periods the first and the last.  `whole`: the runs
-    from start to end, of which errors are given."""
+    """Positions over time, a row for each view; of many periods the first and the last.
+
+    `whole`: the complete runs, whose errors the title states."""
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
@@ -237,7 +238,7 @@ def _off(runs: Runs, view: View) -> str:
         with np.errstate(all="ignore"):
             each = [np.max(np.abs(x - true)) / (np.ptp(true) or 1.0) for x, true in both]
             found[group.title] = float(np.max(each))
-    return extremes(found, f"off the exact {view.what} by at most {{}} of its peak-to-peak range")
+    return extremes(found, f"largest {view.what} error {{}} of the range")
 
 
 def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> str:

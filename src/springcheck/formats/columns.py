@@ -115,8 +115,8 @@ def fitting(path: Path, found: States) -> States:
         return found
     fixed = found.fixed and Fixed(found.fixed.q * turned, found.fixed.v * factor, found.fixed.beside)
     units = {**found.units, "q": unit, "t": t, "v": f"{unit} {t}-1"}
-    states = {"q": found.q * turned, "v": found.v * factor}
-    return replace(found, **states, fixed=fixed, units=units, notes=(*found.notes, *notes))
+    position, rate, said = found.q * turned, found.v * factor, (*found.notes, *notes)
+    return replace(found, q=position, v=rate, fixed=fixed, units=units, notes=said)
 
 
 def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:

@@ -283,7 +283,7 @@ def compare(
 
 
 def likely(joints: list[Joint]) -> list[Joint]:
-    """Those within five standard errors of the best."""
+    """The candidates within five standard errors of the best."""
     low = min((x.chi2 for x in joints), default=0.0)
     return sorted((x for x in joints if x.chi2 <= low + LIKELY), key=lambda x: x.simple)
 

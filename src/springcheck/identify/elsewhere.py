@@ -62,9 +62,9 @@ def _alternating(first: str, half: Sequence[str], middle: str) -> tuple[tuple[st
 def _verlets(first: str, weights: Sequence[str]) -> tuple[tuple[str, Coefficient], ...]:
     """Verlet's method of these lengths, outermost first, about one that makes their sum 1."""
     half = [Fraction(x) for x in weights]
-    every = [*half, 1 - 2 * sum(half), *reversed(half)]
-    between = [(a + b) / 2 for a, b in zip([0, *every], [*every, 0], strict=True)]
-    both = (x for pair in zip(between, [*every, 0], strict=True) for x in pair)
+    every = [*half, 1 - 2 * sum(half, Fraction(0)), *reversed(half)]
+    between = [(a + b) / 2 for a, b in zip([Fraction(0), *every], [*every, Fraction(0)], strict=True)]
+    both = (x for pair in zip(between, [*every, Fraction(0)], strict=True) for x in pair)
     kinds = (first, "drift" if first == "kick" else "kick")
     return tuple((kinds[i % 2], c) for i, c in enumerate(both) if c)
 

@@ -53,20 +53,20 @@ def _roots(found: Map, strides: Sequence[int], exact: bool) -> list[tuple[int, i
 
 
 def guesses(table: Table, found: Map, strides: Sequence[int]) -> tuple[Any, Floats]:
-    """First guesses: the row (c,) of each, and (stride, turns, a, g), (c, 4)."""
+    """First guesses: the catalogue row of each (c,), and its stride, turns, a and g (c, 4)."""
     every = np.array(_roots(found, strides, False)).reshape(-1, 4)
     rows: list[Any] = []
     out: list[Any] = []
-    for r, row in enumerate(table.rows):
+    for n, row in enumerate(table.rows):
         own = []
         if row.free == "share":
             own = [_held(*x) for x in every.tolist()]
         elif row.formula is not None and row.scheme == "exact" and not row.view:
             own = [_exact(*x, damped=row.damped) for x in _roots(found, strides, True)]
-        rows.append(np.full(len(own), r))
+        rows.append(np.full(len(own), n))
         out.append(np.array(own, float).reshape(-1, 4))
     target, loss = every[:, 2], every[:, 3]
-    special = [r for r, row in enumerate(table.rows) if row.free == "share" or _is_flow(row)]
+    special = [n for n, row in enumerate(table.rows) if row.free == "share" or _is_flow(row)]
     usual = np.ones(len(table.rows), bool)
     usual[special] = False
     if len(every) and np.any(usual):

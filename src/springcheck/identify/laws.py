@@ -205,7 +205,8 @@ def _best(fitting: list[tuple[float, float, int, Law]], m: Map, counted: float, 
     good = [x for x in fitting if x[0] <= 3 * least[1] / math.sqrt(x[2] + 2)] or [least]
     kinds = dict.fromkeys(x[3].kind for x in good)
     first = min(good, key=lambda x: x[2])
-    if (first[0] > 1 / FALLS and counted < FEWEST) or size > 1:
+    in_time = first[3].kind in ("time", "driven")
+    if ((first[0] > 1 / FALLS or in_time) and counted < FEWEST) or size > 1:
         return _too_few(counted, size)
     if first[3].kind in ("time", "anharmonic", "driven", "memory") and m.turns < FEW_TURNS:
         return Explanation(

@@ -256,7 +256,7 @@ def measure(record: Record, j: int, kept: Any = None, most: int = 2) -> Map:
         return _orbit(z, noise, unit * level, start, numbers)
 
     best = fitted(0, None)
-    least = max(1 / 16, min(1.0, 8 / max(pairs - 6, 1))) if record.fine else 1.0
+    least = max(1 / 16, min(4.0, 8 / max(pairs - 6, 1))) if record.fine else 1.0
     for numbers in (1, 2)[:most] if record.fine else (1,):
         spare = pairs - 4 - numbers
         if spare < 2 or best.chi2 <= spare * least:

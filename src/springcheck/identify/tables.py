@@ -185,11 +185,12 @@ def _recorded(m: Any, a: Any, view: int | str) -> Any:
     det = m[0] * m[3] - m[1] * m[2]
     back = np.stack([m[3], -m[1], -m[2], m[0]]) / det
     # v half a step ahead of the positions, or behind them, is that of kicks of half a step
-    x, y = {
+    made: dict[int | str, Any] = {
         1: lambda: m[2:], -1: lambda: back[2:], "mean": lambda: (m[:2] - back[:2]) / 2,
         "later": lambda: (m[0] - 1, m[1]), "earlier": lambda: (1 - back[0], -back[1]),
         "half before": lambda: (a / 2, 1 + 0 * a), "half after": lambda: (-a / 2, 1 + 0 * a),
-    }[view]()  # fmt: skip
+    }  # fmt: skip
+    x, y = made[view]()
     one, two, three, four = m[0] - m[1] * x / y, m[1] / y, m[2] - m[3] * x / y, m[3] / y
     return np.stack([one, two, x * one + y * three, x * two + y * four])
 

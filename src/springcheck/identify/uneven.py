@@ -12,7 +12,7 @@ from springcheck.identify.record import of_size
 from springcheck.identify.result import Candidate, Explanation, Identification, nothing
 from springcheck.identify.storage import ROUNDING, storage
 from springcheck.identify.tables import table
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
 FEWEST, OF_STIFFNESS = 12, 1e-7
@@ -109,7 +109,7 @@ class _Steps:
         moved = np.array([size[1], np.max(pull)])
         self.room = 64 * ROUNDING * (size + moved * np.max(np.diff(t))) + late * moved + quanta
 
-    def after(self, r: int, w2: Any, x0: Any, h: Any, at: Any) -> Extended:
+    def after(self, r: int, w2: Any, x0: Any, h: Any, at: Any) -> Any:
         """States (2, c) a step of h (c,) after the frames `at`."""
         one = np.ones(len(h), np.longdouble)
         m = table(PLAIN).unit(np.full(len(h), r), w2 * h * h, 0 * one)
@@ -126,7 +126,7 @@ class _Steps:
             return None
         x = [np.longdouble(-slope if w2 is None else w2), np.longdouble(-start / slope)]
         for _ in range(8):
-            left = ends - self.after(r, *x, h, some)
+            left = ends - self.after(r, x[0], x[1], h, some)
             if np.all(np.abs(left) <= self.room[:, None]):
                 return x[0], x[1]
             steps = np.array([abs(x[0]), np.max(np.abs(self.z[0]))]) * np.longdouble(2.0) ** -20

@@ -15,7 +15,7 @@ reduced units the temperature is kT itself."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bath:
-    """A heat bath.  Raises SceneError for invalid numbers."""
+    """A heat bath: friction rate [1/T] and temperature.  Raises SceneError for invalid numbers."""
 
     temperature: float
     """[K], or kT where units are reduced; > 0."""

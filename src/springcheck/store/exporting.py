@@ -72,7 +72,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
 
 
 def _detach(name: str, node: Any) -> None:
-    """Remove what leads to the dimension scales of the store."""
+    """Remove the references to the dimension scales of the store."""
     for old in digests.SCALES & set(node.attrs):
         del node.attrs[old]
 

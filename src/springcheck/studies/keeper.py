@@ -55,8 +55,6 @@ class Piece:
     """Its name in progress reports."""
     measure: Callable[[], Any]
     form: Form[Any]
-    cost: float = 1.0
-    """Estimate of the time that it takes, relative to other pieces."""
 
     @property
     def name(self) -> str:
@@ -110,18 +108,14 @@ class Keeper:
         found = {piece.name: self.finished(piece.form, piece.key) for piece in pieces}
         left = [piece for piece in pieces if found[piece.name] is None]
         self.resumed += len(pieces) - len(left)
-        if self.team.workers > 1:
-            # longest pieces first, so that the last one to finish is not waited for long
-            left.sort(key=lambda piece: -piece.cost)
-        whole = sum(piece.cost for piece in pieces)
-        done = whole - sum(piece.cost for piece in left)
+        done, whole = len(pieces) - len(left), len(pieces)
         self._tell(done, whole, left[:1])
         with closing(self.team.carried_out([piece.measure for piece in left])) as measured:
             for number, (j, result) in enumerate(measured, 1):
-                found[left[j].name], done = result, done + left[j].cost
+                found[left[j].name] = result
                 self.keep(left[j].form, left[j].key, result)
                 self.say(left[j].form.line(result))
-                self._tell(done, whole, left[number : number + 1])
+                self._tell(done + number, whole, left[number : number + 1])
         return [found[piece.name] for piece in pieces]
 
     def _tell(self, done: float, whole: float, following: Sequence[Piece]) -> None:

@@ -45,7 +45,8 @@ def take(digest: str, stored: Mapping[str, Any]) -> None:
         path.starts, path.most = [*whole["starts"].reshape(-1, n)], [*whole["most"].reshape(5, n)]
         path.series = [*whole["series"].reshape(len(path.powers), STAGES, n)]
         dq, dp = (wide(whole[name].reshape(len(path.done), motion.n)) for name in ("dq", "dp"))
-        reaches = len(path.starts) == len(path.done) and path.done[-1] >= scene.steps
+        finite = all(np.all(np.isfinite(x)) for x in whole.values())
+        reaches = finite and len(path.starts) == len(path.done) and path.done[-1] >= scene.steps
         if not (reaches and np.array_equal(path.starts[0], path.q) and np.all(dq >= 0) and np.all(dp >= 0)):
             raise ValueError("not the reference of this scene")
         motion.paths[1], motion.known[1] = (path,), (wide(path.done), dq, dp)

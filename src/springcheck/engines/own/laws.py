@@ -66,11 +66,12 @@ def _pull(kind: Any) -> Any:
             room[s] = (q[ends[1, s]] - q[ends[0, s]] if pairs else q[ends[0, s]]) - at[s]
         if in_space:
             for j in range(len(firsts) - 1):
-                square = 0.0
-                for s in range(firsts[j], firsts[j + 1]):
-                    square += room[s] * room[s]
-                u = max(math.sqrt(square), TINY)
-                slope = of(u, x, firsts[j])
+                # NumPy's reduceat adds the sum of the others to the first
+                first, others = firsts[j], 0.0
+                for s in range(first + 1, firsts[j + 1]):
+                    others += room[s] * room[s]
+                u = max(math.sqrt(room[first] * room[first] + others), TINY)
+                slope = of(u, x, first)
                 for s in range(firsts[j], firsts[j + 1]):
                     room[s] = slope * (room[s] / u)
         else:

@@ -50,7 +50,7 @@ def exponential(x: float) -> float:
 def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     """Fill f with the force of index lists: summed over the terms in this order, then over each list.
 
-    What is driven reads the time off the last coordinate, and is summed as NumPy sums: first over all ends a,
+    A driven term reads the time from the last coordinate.  It is summed in NumPy's order: over all ends a,
     then over all ends b.
     """
     walls, springs, quartics, cosines, weights, morses, dampings, brakes, drives, laws = terms

@@ -123,7 +123,7 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
         found = tuple(o._replace(force=POTENTIAL) if o.force == ALL else o for o in without)
     forces = tuple(dict.fromkeys(o.force for o in found if o.force))
     if len(forces) > 2:
-        raise NoKernelError(f"{len(forces)} forces apart, where two are served")
+        raise NoKernelError(f"{len(forces)} groups of forces; at most two can be compiled")
     depends = tuple(damped and name in (ALL, SLOW) for name in (*forces, "", "")[:2])
     return Program(operations=(*clock, *found), forces=forces or (ALL,), damped=depends)
 

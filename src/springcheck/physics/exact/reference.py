@@ -321,7 +321,7 @@ def reference(system: System[Any]) -> ReferenceMotion:
     found = _STORED.pop(key, None)
     if found is None:
         try:
-            with contextlib.suppress(ValueError, KeyError, IndexError):
+            with contextlib.suppress(ArithmeticError, LookupError, TypeError, ValueError):
                 found = ReferenceMotion(system, FILLED[key])
             found = found or ReferenceMotion(system)
         except NoReferenceError as error:

@@ -110,10 +110,11 @@ def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
         return []
     kinds = ("configurational", "kinetic")
     charts = [_of_kind(kind, found) for kind in kinds if np.isfinite([getattr(x, kind) for x in found]).any()]
-    heading = f"{runs.scene.title}: {_farthest(found)}"
+    heading, said = _farthest(found)
     return [
-        Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=len(charts))
-    ]
+        Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading,
+             foot=f"{runs.scene.title}: {said}", columns=len(charts))
+    ]  # fmt: skip
 
 
 def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
@@ -146,15 +147,15 @@ def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
     )  # fmt: skip
 
 
-def _farthest(found: Sequence[Heated]) -> str:
-    """The scheme farthest from its bath by its law, or else the run that is by its frames, in a sentence."""
-    kinds, measured = ("configurational", "kinetic"), ""
+def _farthest(found: Sequence[Heated]) -> tuple[str, str]:
+    """The method farthest from its bath by its law, or else by its frames: in short, and in a sentence."""
+    kinds, where = ("configurational", "kinetic"), "in theory"
     both = [(getattr(one, f"{kind}_law"), kind, one.method) for one in found for kind in kinds]
     if not np.any(np.isfinite([x for x, *_ in both])):
         both = [(getattr(one, kind), kind, one.method) for one in found for kind in kinds]
-        measured = " in its frames"
+        where = "in its frames"
     x, kind, method = max((one for one in both if np.isfinite(one[0])), key=lambda one: abs(one[0] - 1))
     if x == 1:
-        return "in theory it has the temperature of the bath"
-    off = f"{100 * abs(x - 1):.2g} % too {'hot' if x > 1 else 'cold'}"
-    return f"the {kind} temperature of {method} is {off}{measured or ' in theory, however long it runs'}"
+        return ("In theory all have the temperature of the bath",) * 2
+    off = f"{100 * abs(x - 1):.2g} % too {'hot' if x > 1 else 'cold'} {where}"
+    return f"{method}: {off}", f"the {kind} temperature of {method} is {off}"

@@ -12,6 +12,7 @@ from springcheck import engines, schemes
 from springcheck.errors import MethodError
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of, title
+from springcheck.figures.overlay import MOST_LETTERS
 from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -186,7 +187,8 @@ class Stability(Studied):
             y=Scale(name="spectral radius of one step: above 1 it grows", log=True, shown=(0.1, 100.0)),
             curves=[*lines.values(), *marks], rules=rules,
         )  # fmt: skip
-        heading = f"Stable up to {h_w} (methods): {self.said(short=True)}"
+        heading = f"Stable {h_w} (methods): {self.said(short=True)}"
+        heading = heading if len(heading) <= MOST_LETTERS else f"Stability of {count(len(marks), 'method')}"
         return [
             Bank(name="stability", title="Schemes (lines) and methods (marks)", heading=heading,
                  charts=[chart], foot=f"{self.scene.title}: lines in theory, marks as measured")
