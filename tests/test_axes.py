@@ -67,7 +67,7 @@ def test_engines_in_space_pass_every_check(label: str, make: object) -> None:
 
 def test_a_bond_of_a_program_that_is_not_alike_along_its_axes_is_refused() -> None:
     unlike = planar(terms=(Spring(a=[0, 1], b=[2, 3], k=[1.7, 1.9], rest=[0.0, 0.0]),))
-    with pytest.raises(MethodError, match="alike along every axis"):
+    with pytest.raises(MethodError, match="along every axis"):
         driver.run(unlike, "openmm:verlet")
     # counted from their rest a bond of a rest length along y is one of none
     long = planar(terms=(Spring(a=[0, 1], b=[2, 3], k=[1.7, 1.7], rest=[0.0, 0.5]),))

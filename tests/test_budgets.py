@@ -36,7 +36,7 @@ TO_COME = {
     ("physics",): 3800,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4485,
-    ("identify",): 6155,
+    ("identify",): 6200,
     ("store",): 2655,
     ("formats",): 1531,
     ("studies",): 6412,

@@ -223,7 +223,7 @@ def test_lists_and_objects_are_refused_in_one_line(name: str) -> None:
     scene = many()
     run = run_of(scene)
     for given in (getattr(run, name).tolist(), getattr(run, name).astype(object)):
-        with pytest.raises(SpringcheckError, match=rf"^own:semi-implicit-euler: {name} is [^\n]* is needed$"):
+        with pytest.raises(SpringcheckError, match=rf"^own:semi-implicit-euler: {name} is [^\n]* needed$"):
             springcheck.judge(scene, replace(run, **{name: given}))
 
 

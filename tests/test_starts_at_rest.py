@@ -82,7 +82,7 @@ def test_what_goes_with_files_of_others_is_refused_for_a_store(
     path = tmp_path / "run.h5"
     springcheck.run("spring", "own:euler", path=path)
     assert main(["plot", str(path), "-o", str(tmp_path), "--step", "0.1"]) == 2
-    assert "file of another program" in capsys.readouterr().err
+    assert "--step is for files of other programs" in capsys.readouterr().err
 
 
 CANCELLING = (

@@ -45,6 +45,7 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene, names
 from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.extremes.result import windows
 
 MODES = ("single", "mixed", "double")
 FORCES = (-1e12, -3e9, -2.2e9, -2.1e9, 2.1e9, 2.2e9, 3e9, 1e12)
@@ -138,8 +139,8 @@ def atlas(label: str) -> dict[str, Any]:
     """How the cells of `springcheck extremes` come out by a method, and its window of forces."""
     cells = extremes.of_method(engines.parse(label))
     wrong = [[x.parameters, x.reason, x.value, x.bound] for x in cells if x.outcome == "silently wrong"]
-    windows = [[float(x.low), float(x.high)] for x in extremes.windows(cells)]
-    return {"outcomes": Counter(x.outcome for x in cells), "windows": windows, "wrong": wrong}
+    found = [[float(x.low), float(x.high)] for x in windows(cells)]
+    return {"outcomes": Counter(x.outcome for x in cells), "windows": found, "wrong": wrong}
 
 
 def cost(platform: str) -> dict[str, dict[str, float]]:

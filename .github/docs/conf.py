@@ -36,7 +36,6 @@ myst_enable_extensions = ["colon_fence"]
 numpydoc_show_class_members = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-autodoc_mock_imports = ["MDAnalysis"]
 # links to scripts and folders are no pages of the site; tests/test_readme.py finds dead ones
 suppress_warnings = ["myst.xref_missing", "myst.header"]
 
