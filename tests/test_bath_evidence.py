@@ -22,6 +22,7 @@ from springcheck import checks, driver, engines
 from springcheck.bath import THERMOSTATS, evidence
 from springcheck.bath.evidence import Known
 from springcheck.cli import main
+from springcheck.identify import scenes
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory, Verdict
@@ -281,6 +282,27 @@ def test_a_fault_fails_its_checks_and_no_other(name: str) -> None:
     scene = baths.springs(3, steps=8000)
     run = make(Broken(scene=scene, scheme=THERMOSTATS[scheme], seed=11, x=0.0))
     assert {v.check for v in checks.judge(scene, run) if v.passed is False} - {"energies"} == wanted
+
+
+SHOWN = {
+    "noise of an old friction": "the noise is 1.8",
+    "no root of the mass": "the noise of the coordinates is ",
+    "shared by all": "the random numbers of coordinate 1 are the same as those of coordinate 0",
+    "begun anew": "the random numbers from row 4000 on are those from row 0 on, again",
+    "a force too large": "the force is not that of the scene",
+    "friction": "the drag is not the one that the friction asks for",
+    "collisions too often": "times as often as the friction asks",
+}
+"""What the draws of a fault show."""
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_the_draws_of_a_fault_show_it(name: str) -> None:
+    """The noise of an old friction was also draws that repeat, that go with the forces and of a period."""
+    scheme, make, _ = FAULTS[name]
+    scene = baths.springs(3, steps=8000)
+    run = make(Broken(scene=scene, scheme=THERMOSTATS[scheme], seed=11, x=0.0))
+    assert SHOWN[name] in scenes.diagnosis(scene, run, 0)
 
 
 @pytest.mark.parametrize("name", ["baoab", "obabo", "bbk", "gj-i-half", "lammps-langevin", "andersen"])

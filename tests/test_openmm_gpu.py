@@ -77,10 +77,10 @@ def test_a_file_from_cuda_is_judged_by_the_arithmetic_that_is_stated(mode: str, 
     given: dict[str, Any] = {"scene": scene, "scheme": "velocity-verlet"}
     plain = file.judge(path, **given)
     assert plain.status == 1
-    assert any("--arithmetic openmm:verlet@CUDA-mixed" in note for note in plain.notes)
+    assert any(f"--arithmetic openmm:verlet@CUDA-{mode} " in note for note in plain.notes), plain.notes
     stated = file.judge(path, **given, arithmetic=f"openmm:verlet@CUDA-{mode}")
     assert stated.status == 0
-    assert any(f"judged by the arithmetic of openmm:verlet@CUDA-{mode}" in note for note in stated.notes)
+    assert any(f"judged with the arithmetic of openmm:verlet@CUDA-{mode}" in note for note in stated.notes)
     with pytest.raises(MethodError, match="is not of the form"):
         file.judge(path, **given, arithmetic="")
     # another scheme, and a force that is wrong by more than single precision, fail all the same

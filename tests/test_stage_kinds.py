@@ -62,6 +62,6 @@ def test_kinds_are_named_in_the_table_and_by_schemes_alone() -> None:
     }
     assert {name for name in named if not name.startswith(("identify/", "bath/"))} == {
         "schemes/kinds.py", "schemes/catalogue.py",
-        # of thermostats, and what the page's loops carry out
-        "checks/stages.py", "cli/page/given.py",
+        # what the page's loops carry out
+        "cli/page/given.py",
     }  # fmt: skip

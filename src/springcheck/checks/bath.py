@@ -50,6 +50,11 @@ def _unread(case: Case) -> int:
     return int(thermostat(case).carried > 0 and case.steps[0] == 0)
 
 
+def rows_a_step(case: Case) -> int:
+    """Rows of draws that each step has."""
+    return len(reading(case).draws) // (len(case.trajectory.t) - 1 - _unread(case))
+
+
 @check("across", family="noise", requires={"every-step"})
 def noise_direction(case: Case) -> Finding | str:
     """Each step is the scheme's own map and some draws: what no draw can explain is rounding.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,13 +17,14 @@ from springcheck.formats import States
 from springcheck.identify import scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.physics.trajectory import Verdict
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import choose, keeper
 from springcheck.studies.choose import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 
-NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step|less than double precision"
+COARSE = ("openmm:verlet@CUDA-double", "openmm:verlet@CUDA-mixed", "openmm:verlet@CUDA-single")
+"""Methods as whose arithmetic the steps of a failed file are tried."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,6 +132,13 @@ def _shown(path: Path, states: States, scene: Scene) -> schemes.Scheme:
     return schemes.scheme(found.scheme)
 
 
+def _rounded_as(run: Trajectory, label: str) -> Trajectory:
+    """The run of a program that rounds as this method does, its numbers as coarse as they are written."""
+    how = engines.arithmetic(engines.parse(label))
+    state, written = max(how.state, run.arithmetic.state), run.arithmetic.written
+    return replace(run, arithmetic=replace(how, state=state, written=written))
+
+
 def judge(
     path: Path,
     *,
@@ -165,19 +172,23 @@ def judge(
         run = replace(run, rebuilds_velocity=True)
         notes += ("velocities were judged as differences of positions, as stated",)
     if arithmetic is not None:
-        how = engines.arithmetic(engines.parse(arithmetic))
-        state, written = max(how.state, run.arithmetic.state), run.arithmetic.written
-        run = replace(run, arithmetic=replace(how, state=state, written=written))
-        notes += (f"judged with the arithmetic of {arithmetic}, as stated: {str(how) or 'double'}",)
+        run = _rounded_as(run, arithmetic)
+        notes += (
+            f"judged with the arithmetic of {arithmetic}, as stated: {str(run.arithmetic) or 'double'}",
+        )
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
         for v in checks.explained(judged, run, checks.judge(judged, run), scenes.diagnosis)
     ]
     if states.roundoff > 2.0**-53 or known.flow:
         verdicts.append(shown.other_scheme(judged, run, states))
-    if arithmetic is None and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
-        notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
     wrong = any(v.passed is False and v.check in checks.TELLING for v in verdicts)
+    if wrong and arithmetic is None and run.arithmetic.is_double and not checks.cause_of(verdicts):
+        notes += tuple(
+            f"every step is right in the arithmetic of {label}: --arithmetic {label} judges it so"
+            for label in COARSE
+            if checks.step_defect(checks.Case(trajectory=_rounded_as(run, label), scene=judged)).passed
+        )[:1]
     if wrong and checks.are_differences(checks.Case(trajectory=run, scene=judged)):
         notes += ("velocities are differences of the positions, which keep eps q/h of them: --differences",)
     return Judgement(

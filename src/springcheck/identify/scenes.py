@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.bath import THERMOSTATS
-from springcheck.checks import driven, other
+from springcheck.checks import driven, noise, other
 from springcheck.checks.case import Case
 from springcheck.errors import IdentificationError
 from springcheck.identify.catalogue import capital
@@ -89,6 +89,8 @@ def _alone(scene: Scene, run: Trajectory) -> Identification:
 def diagnosis(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
     """What explains that a run is not its scheme's around a frame, and what to do, in sentences; "" where
     nothing known here does.  `few` steps that are off alone are explained by what acts in frames alone."""
+    if run.scheme in THERMOSTATS and (said := noise.found(Case(trajectory=run, scene=scene))):
+        return said
     try:
         found = of_scene(scene, run, about=about, claimed=run.scheme)
     except IdentificationError:
