@@ -11,15 +11,15 @@ Claims:
 
 Command: python validation/error_vs_runtime.py [FOLDER]      (default: data/figures; a minute)
 
-Expected (two cores of an AMD EPYC shared with much other work, openmm 8.6, ase 3.29, scikit-sundae 1.2), time
+Expected (an idle core of an AMD EPYC, openmm 8.6, ase 3.29, scikit-sundae 1.2), time
 and force calls of an error relative to the initial energy norm:
 
-    1e-2   own:rk4      3.2 us      own:ruth3          93
-    1e-4   own:rk4      4.9 us      sundials:adams    164
+    1e-2   own:ruth3    2.2 us      own:ruth3          93
+    1e-4   own:ruth3    4.6 us      sundials:adams    164
     1e-6   own:rk4       12 us      sundials:adams    292
     1e-8   own:rk4       35 us      sundials:adams    292
     1e-10  own:rk4      106 us      sundials:adams    391
-    1e-12  own:rk4      329 us      sundials:adams    447
+    1e-12  own:rk4      328 us      sundials:adams    447
 
 Exit status 0 where the claims hold, 1 otherwise.
 """
