@@ -27,7 +27,7 @@ brackets the ratio to C):
     chain of 100,000 masses          0.84 (1.20)     0.86 (1.25)     4.6 (1.11)
     chain of 1,000,000 masses        1.9 (1.19)      1.8 (1.12)      5.3 (1.19)
 
-Forest-Ruth: 1.00 on one spring, 2.3 on 4096; RK4: 1.6 and 4.4.
+Forest-Ruth: 1.00 on one spring, 1.3 to 2.3 on 4096; RK4: 1.6 and 4.4.
 
 Exit status 0 when every ratio holds, 1 otherwise.
 """
