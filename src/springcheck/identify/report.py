@@ -23,8 +23,8 @@ from springcheck.identify.seeing import see
 from springcheck.identify.shapes import not_opposite
 from springcheck.identify.uneven import of_uneven
 
-CLEAN = 64.0
-"""Excess of a map that is rounding."""
+CLEAN, FEWEST_LATE, HALF_A_STEP_AGO = 64.0, 12, "half a step ago"
+"""Excess of a map that is rounding, fewest frames that show a late start, and the law that has it."""
 
 
 def identify_arrays(
@@ -106,7 +106,35 @@ def of_record(
             return unnamed(seen, unlike)
         return said(seen, found, one)
 
+    if repairing and (late := _started_late(seen, record, stiffness, friction, step)):
+        return late
+
     def again_of(other: Record, _: Seen) -> Identification:
         return of_record(other, stiffness, friction, step, repairing=False)
 
     return unnamed(seen, *explain(seen, again_of if repairing else None))
+
+
+def _started_late(
+    seen: Seen, record: Record, stiffness: Any, friction: float | None, step: float | None
+) -> Identification | None:
+    """The identification from frame 1 on, where friction of the velocity half a step ago begins with that of
+    the first velocity; None of other motions."""
+    kept = np.arange(len(record.q) - 1) > 0
+    if len(record.q) < FEWEST_LATE:
+        return None
+    for j, m in zip(seen.moving, seen.maps, strict=True):
+        if seen.record is not record or int(np.argmax(np.max(np.abs(m.left), 1) / m.base)) > 0:
+            return None
+        off = np.max(np.abs(measure(record, j, kept).left), 1) / m.base
+        if np.max(off[1:]) > 64 or off[0] <= 64:
+            return None
+    later = replace(record, q=record.q[1:], v=record.v[1:], dq=record.dq[1:], dv=record.dv[1:])
+    again = see(later, stiffness, friction, step)
+    found, one = search(again)
+    found = [x for x in found if HALF_A_STEP_AGO in x[0].row.law]
+    return (
+        said(again, found, one).noting("the first step has the friction of its first velocity")
+        if found and one
+        else None
+    )
