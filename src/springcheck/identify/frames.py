@@ -109,8 +109,8 @@ def _said(record: Record, found: Map, base: Any, runs: list[Any], rest: float) -
             begins = f"The first frames, up to {last + 1}, follow another map than those after them"
             begins += f",{of}" if of else ""
         return Explanation(
-            f"{begins}: a wrong start, a first frame recorded otherwise than the rest, or a scheme with "
-            f"memory, by the force of the step before or with a beginning of its own{more}",
+            f"{begins}: a wrong start, a first frame that is recorded otherwise, or a scheme with memory, "
+            f"whose force is that of the step before, or that begins with steps of its own{more}",
             "look at how the first steps are made",
             local=True,
         )
