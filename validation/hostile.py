@@ -384,6 +384,9 @@ def mutilate(file: Any, rng: random.Random) -> None:
     """Remove one object or attribute, or put one of the wrong type in its place."""
     names: list[str] = []
     file.visit(names.append)
+    if not names:
+        # all has been removed before
+        return
     name = rng.choice(names)
     wrong: list[Any] = ["text", 1.5, np.zeros((2, 2, 2), "i2"), np.zeros(0), np.array([b"x"]), np.nan]
     keys = list(file[name].attrs)
