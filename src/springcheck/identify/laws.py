@@ -133,6 +133,9 @@ LAWS = (
     Law("time", "The step or the stiffness changes in time", STEADY, 0,
         lambda z, r: _time(z, z[:, 0], z[:, 1])),
 )  # fmt: skip
+FAINT = 1e-12
+"""Effect of a law on a frame, relative to the state, below which few frames do not tell it from another."""
+
 ALSO = {
     "time": "changes in time", "anharmonic": "is anharmonic", "drag": "depends on the velocity",
     "driven": "is driven",
@@ -205,8 +208,9 @@ def _best(fitting: list[tuple[float, float, int, Law]], m: Map, counted: float, 
     good = [x for x in fitting if x[0] <= 3 * least[1] / math.sqrt(x[2] + 2)] or [least]
     kinds = dict.fromkeys(x[3].kind for x in good)
     first = min(good, key=lambda x: x[2])
-    in_time = first[3].kind in ("time", "driven")
-    if ((first[0] > 1 / FALLS or in_time) and counted < FEWEST) or size > 1:
+    # in few frames a law in time, or one near the rounding of doubles, may be any other
+    unsure = first[0] > 1 / FALLS or first[3].kind in ("time", "driven") or size < FAINT
+    if (unsure and counted < FEWEST) or size > 1:
         return _too_few(counted, size)
     if first[3].kind in ("time", "anharmonic", "driven", "memory") and m.turns < FEW_TURNS:
         return Explanation(
