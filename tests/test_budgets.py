@@ -36,7 +36,7 @@ TO_COME = {
     ("physics",): 3800,
     ("driver", "doors", "conformance", "processes"): 1300,
     ("checks",): 4710,
-    ("identify",): 6230,
+    ("identify",): 6232,
     ("store",): 2655,
     ("formats",): 1531,
     ("studies",): 6412,
