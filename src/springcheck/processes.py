@@ -71,12 +71,14 @@ def called(
             return
 
     def drain(stream: Any, into: bytearray) -> None:
-        while block := stream.read1(1 << 16):
-            into += block
-            if len(into) > most:
-                kill()
-                err.extend(f"\nmore than {most >> 20} MiB of output\n".encode())
-                return
+        # after an interrupt the stream may be closed while it is read
+        with contextlib.suppress(ValueError, OSError):
+            while block := stream.read1(1 << 16):
+                into += block
+                if len(into) > most:
+                    kill()
+                    err.extend(f"\nmore than {most >> 20} MiB of output\n".encode())
+                    return
 
     pipe = subprocess.PIPE
     with deferred():
