@@ -26,6 +26,8 @@ from springcheck.text.wording import rounded_down
 
 mp.mp.dps = 40
 POINTS, MOST, ALLOWED = 4000, 4.0, 1e-9
+NO_GROWTH = 1e-25
+"""Excess of an eigenvalue over 1 that is rounding."""
 
 
 def coefficient(c: object) -> mp.mpf:
@@ -61,12 +63,12 @@ def growth(matrix: mp.matrix) -> mp.mpf:
 
 
 def first(grows: Callable[[mp.mpf], mp.mpf], most: float = MOST, points: int = POINTS) -> mp.mpf:
-    """The first point of growth beyond 1e-25, by a scan and bisection."""
+    """The first point of growth beyond `NO_GROWTH`, by a scan and bisection."""
     grid = [mp.mpf(most) * i / points for i in range(1, points + 1)]
-    low, high = next(((a, b) for a, b in pairwise(grid) if grows(b) > 1e-25), (mp.inf, mp.inf))
+    low, high = next(((a, b) for a, b in pairwise(grid) if grows(b) > NO_GROWTH), (mp.inf, mp.inf))
     while mp.isfinite(high) and high - low > 1e-20:
         middle = (low + high) / 2
-        low, high = (low, middle) if grows(middle) > 1e-25 else (middle, high)
+        low, high = (low, middle) if grows(middle) > NO_GROWTH else (middle, high)
     return mp.mpf(low)
 
 

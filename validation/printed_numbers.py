@@ -26,6 +26,7 @@ import mpmath as mp
 import numpy as np
 
 from arguments import arguments, script
+from limits import NO_GROWTH, first, growth
 from springcheck.cli import main as springcheck
 
 mp.mp.dps = 40
@@ -192,21 +193,10 @@ def limit(label: str) -> Any:
     never has, 0 where it always has."""
     oscillator = Linear("spring")
 
-    def grows(x: Any) -> bool:
-        one = map_of(label, oscillator, x)
-        half, area = (one[0, 0] + one[1, 1]) / 2, mp.det(one)
-        root = mp.sqrt(mp.mpc(half * half - area))
-        return bool(max(abs(half + root), abs(half - root)) > 1 + mp.mpf("1e-25"))
+    def grown(x: Any) -> Any:
+        return growth(map_of(label, oscillator, x))
 
-    grid = [mp.mpf(x) / 100 for x in range(1, 401)]
-    low, high = mp.mpf(0), next((x for x in grid if grows(x)), mp.inf)
-    if high in (mp.inf, grid[0]):
-        return mp.inf if high == mp.inf else mp.mpf(0)
-    low = high - grid[0]
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (low, middle) if grows(middle) else (middle, high)
-    return low
+    return mp.mpf(0) if grown(mp.mpf("0.01")) > NO_GROWTH else first(grown, points=400)
 
 
 def said(*words: str) -> str:

@@ -184,11 +184,9 @@ def judge(
         verdicts.append(shown.other_scheme(judged, run, states))
     wrong = any(v.passed is False and v.check in checks.TELLING for v in verdicts)
     if wrong and arithmetic is None and run.arithmetic.is_double and not checks.cause_of(verdicts):
-        notes += tuple(
-            f"every step is right in the arithmetic of {label}: --arithmetic {label} judges it so"
-            for label in COARSE
-            if checks.step_defect(checks.Case(trajectory=_rounded_as(run, label), scene=judged)).passed
-        )[:1]
+        rounded = ((label, checks.Case(trajectory=_rounded_as(run, label), scene=judged)) for label in COARSE)
+        if label := next((label for label, case in rounded if checks.step_defect(case).passed), ""):
+            notes += (f"every step is right in the arithmetic of {label}: --arithmetic {label} judges it so",)
     if wrong and checks.are_differences(checks.Case(trajectory=run, scene=judged)):
         notes += ("velocities are differences of the positions, which keep eps q/h of them: --differences",)
     return Judgement(
